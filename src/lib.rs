@@ -1,0 +1,35 @@
+//! *Nothing in plain sight may be culled.* plainsight is a deterministic test bench for visibility
+//! culling in dynamic 3D scenes: a bit-exact CPU z-buffer (the crate `plainsight-reference`) computes
+//! which parts of a seeded scene are visible in each frame, cullers run beside it, and the checks
+//! prove frame by frame that none of them dropped anything visible.
+//!
+//! # The map
+//! A room may import only rooms that stand **above** it; `tests/tidy.rs` holds the borders.
+//!
+//! | room | holds | must not know |
+//! |---|---|---|
+//! | `plainsight_reference` | the truth: raster rules, naive and fast renderer, image hash | anything of plainsight |
+//! | [`math`] | boxes, planes, frustum, projection with error bounds, deterministic trigonometry | scenes |
+//! | [`scene`] | description, scene file, seed streams, generators, import | effects' state, cullers |
+//! | [`part`] | meshes cut into parts, object trees, stable ids | moving indexes, oracles |
+//! | [`effect`] | one effect per file: (scene, t) to placements | indexes, oracles |
+//! | [`index`] | one structure over objects per file, behind one trait | scenes |
+//! | [`oracle`] | answers "would this contribute?", one oracle per file behind one trait | indexes, cullers |
+//! | [`cull`] | one frame loop per file behind one trait | the truth |
+//! | [`run`] | scene + culler + oracle to a trace, observed frame by frame | the checks |
+//! | [`check`] | observers of a run, one property per file | reports |
+//! | [`report`] | tables and pictures | |
+//!
+//! A frame is a pure function of (scene, t). Nothing that is compared sees a clock, a hash order, an
+//! address or the timing of a thread.
+
+pub mod check;
+pub mod cull;
+pub mod effect;
+pub mod index;
+pub mod math;
+pub mod oracle;
+pub mod part;
+pub mod report;
+pub mod run;
+pub mod scene;

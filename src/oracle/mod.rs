@@ -1,0 +1,149 @@
+//! Oracles answer "would this contribute?": ask now, collect later. One oracle per file behind
+//! [`Oracle`]; `always` is the stupid one. Only `wgpu/` names wgpu. An oracle must not know indexes
+//! or cullers; it knows the parts it may be told to draw.
+//!
+//! # The contract
+//! A frame is a command stream. Draws compare *less* and write depth; a question compares
+//! *less-or-equal* against what was drawn **before it in the stream** and writes nothing. `submit`
+//! ends a batch; `collect` waits for the oldest batch not yet collected and hands its answers over in
+//! asking order, so that no culler sees arrival times. An answer may err only towards "visible".
+
+mod always;
+pub mod sim;
+#[cfg(feature = "hardware")]
+pub mod wgpu;
+
+use std::sync::Arc;
+
+use crate::part::{PartId, Partition};
+use crate::scene::Viewport;
+
+pub use always::Always;
+
+
+/// What an oracle is told at the start of a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameView<'a> {
+    /// Frame number t.
+    pub frame: u32,
+    /// Object-to-clip matrix of each object, column-major, composed in f64 and rounded once.
+    pub clip_from_object: &'a [[f32; 16]],
+}
+
+/// The conservative stand-in that is asked about in place of geometry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Proxy {
+    /// A rectangle of whole pixels, columns `min[0]..max[0]`, rows `min[1]..max[1]` (row 0 on top),
+    /// within the viewport and not empty, at one depth in [0, 1].
+    Rectangle {
+        /// First column and row.
+        min: [u32; 2],
+        /// One beyond the last column and row.
+        max: [u32; 2],
+        /// Depth of every sample.
+        depth: f32,
+    },
+    /// The twelve triangles of a box with interpolated depth.
+    Box {
+        /// Clip from the box's space, column-major.
+        clip_from_box: [f32; 16],
+        /// Smallest corner, already inflated.
+        min: [f32; 3],
+        /// Largest corner, already inflated.
+        max: [f32; 3],
+    },
+}
+
+/// A question's number in its frame, counted from zero in asking order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct QueryId(pub u32);
+
+/// What came back for one question.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// Which question of the frame.
+    pub query: QueryId,
+    /// Whether any sample passed.
+    pub visible: bool,
+}
+
+/// Images that a device gave back. Row 0 is on top; `width × height` entries each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadBack {
+    /// Depth, 1.0 where nothing was drawn.
+    pub depth: Vec<f32>,
+    /// Part id plus one, 0 where nothing was drawn. `None` where only depth was asked for.
+    pub parts: Option<Vec<u32>>,
+}
+
+/// What an oracle works on, fixed for a run.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// The parts that may be drawn.
+    pub partition: Arc<Partition>,
+    /// Pixels.
+    pub viewport: Viewport,
+}
+
+/// Why an oracle could not go on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OracleError {
+    /// No device was found where one was required.
+    #[error("no Vulkan device: {0}")]
+    NoDevice(String),
+    /// The device went away or refused in the middle of a run.
+    #[error("device lost: {0}")]
+    Lost(String),
+}
+
+/// Answers visibility questions about a frame while it is being drawn.
+pub trait Oracle {
+    /// Name for reports: `always`, `sim`, `hardware`.
+    fn name(&self) -> &'static str;
+
+    /// The adapter's name where a real device draws.
+    fn device(&self) -> Option<String> {
+        None
+    }
+
+    /// Clears depth to 1.0 and forgets all questions.
+    ///
+    /// # Errors
+    /// Where the device is lost.
+    fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError>;
+
+    /// Draws one part into the frame, at this point of the stream.
+    fn draw_part(&mut self, part: PartId);
+
+    /// Asks, at this point of the stream, whether any sample of `proxy` would pass.
+    fn ask(&mut self, proxy: &Proxy) -> QueryId;
+
+    /// Ends the batch: everything since the last submit goes to the device, even if nothing asks.
+    ///
+    /// # Errors
+    /// Where the device is lost.
+    fn submit(&mut self) -> Result<(), OracleError>;
+
+    /// Waits for the oldest batch not yet collected and appends its answers in asking order.
+    /// Appends nothing where no batch is outstanding.
+    ///
+    /// # Errors
+    /// Where the device is lost.
+    fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError>;
+
+    /// The depth that the frame's own draws left, after an implied submit. `None` where the oracle
+    /// keeps no image.
+    ///
+    /// # Errors
+    /// Where the device is lost.
+    fn read_back(&mut self) -> Result<Option<ReadBack>, OracleError>;
+
+    /// Draws `parts` (ascending) from scratch in draw-index order under the frame's matrices, into
+    /// images of its own, and reads depth and part ids back. The frame's own images stay. `None`
+    /// where no real device draws.
+    ///
+    /// # Errors
+    /// Where the device is lost.
+    fn redraw(&mut self, parts: &[PartId]) -> Result<Option<ReadBack>, OracleError>;
+}

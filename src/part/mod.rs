@@ -1,0 +1,192 @@
+//! Meshes cut into parts: the object trees of Kovalčík & Sochor 2006 (section 3.1), part boxes and
+//! stable ids. It must not know indexes over moving objects, nor oracles.
+//!
+//! Ids. A mesh's fragments are ranked by (source triangle, fragment); a *draw index* is the sum of
+//! the object's first index and the rank, so that it orders by (object, source triangle, fragment)
+//! as the raster rules ask. A *part id* is the sum of the object's first part and the leaf's number
+//! in its tree, counted in depth-first order. Both are functions of the scene and the knobs alone.
+
+mod cut;
+mod tree;
+
+use std::sync::Arc;
+
+use crate::math::Aabb;
+use crate::scene::{Mesh, Scene};
+
+pub use tree::{ObjectNode, ObjectTree};
+
+/// How meshes become parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PartitionKnobs {
+    /// A leaf of an object tree holds at most this many triangles, unless no plane can part them.
+    /// At least 1. An object with no more than this is one part and has no tree.
+    pub leaf_triangles: u32,
+}
+
+impl Default for PartitionKnobs {
+    fn default() -> Self {
+        Self { leaf_triangles: 3072 }
+    }
+}
+
+/// A part of the whole scene; counts up from zero over objects, then over an object's leaves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PartId(pub u32);
+
+/// An object of the scene, by its place in the list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ObjectId(pub u32);
+
+/// One part of a mesh: a run of vertices and a run of triangles that use no others.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// First of its positions in [`PartedMesh::positions`].
+    pub first_vertex: u32,
+    /// How many positions.
+    pub vertex_count: u32,
+    /// First of its triangles in [`PartedMesh::triangles`].
+    pub first_triangle: u32,
+    /// How many triangles; at least one, but for the single part of an empty mesh.
+    pub triangle_count: u32,
+    /// Tight box of its positions in the object's space, exact.
+    pub bounds: Aabb,
+}
+
+/// A mesh cut into parts. Positions and triangles are grouped by part; a position on a cut stands in
+/// each part that uses it, bit for bit the same.
+#[derive(Clone, Debug)]
+pub struct PartedMesh {
+    /// Positions, grouped by part.
+    pub positions: Vec<[f32; 3]>,
+    /// Triangles, grouped by part and ascending in rank within one. Indices count **from the part's
+    /// first vertex**.
+    pub triangles: Vec<[u32; 3]>,
+    /// Rank of each triangle of `triangles`: its place in the order (source triangle, fragment).
+    pub ranks: Vec<u32>,
+    /// The part that holds the fragment of each rank.
+    pub part_of_rank: Vec<u32>,
+    /// The place in `triangles` of the fragment of each rank.
+    pub triangle_of_rank: Vec<u32>,
+    /// The source triangle of each rank, non-decreasing.
+    pub source_of_rank: Vec<u32>,
+    /// The parts, at least one.
+    pub parts: Vec<Part>,
+    /// The tree over the parts; `None` for a mesh of one part.
+    pub tree: Option<ObjectTree>,
+    /// Tight box of all positions.
+    pub bounds: Aabb,
+}
+
+/// A scene's objects cut into parts, with the numbering that ids follow.
+#[derive(Clone, Debug)]
+pub struct Partition {
+    meshes: Vec<Arc<PartedMesh>>,
+    mesh_of_object: Vec<u32>,
+    first_part: Vec<u32>,
+    first_draw: Vec<u32>,
+}
+
+impl Partition {
+    /// Cuts every mesh of `scene`, several at once; the result does not depend on how many.
+    ///
+    /// # Panics
+    /// Where the scene has 2³² − 1 or more fragments or parts: draw indices are 32 bits wide.
+    #[must_use]
+    pub fn new(scene: &Scene, knobs: PartitionKnobs) -> Self {
+        use rayon::prelude::*;
+        let cut = |mesh: &Arc<Mesh>| Arc::new(cut::cut(mesh, knobs));
+        let meshes: Vec<_> = scene.meshes.par_iter().map(cut).collect();
+        let mesh_of_object: Vec<u32> = scene.objects.iter().map(|o| o.mesh).collect();
+        let running = |size: &dyn Fn(&PartedMesh) -> usize| {
+            let mut sums = vec![0_u32];
+            for &mesh in &mesh_of_object {
+                let total = sums[sums.len() - 1] as usize + size(&meshes[mesh as usize]);
+                assert!(total < u32::MAX as usize, "draw indices and part ids are 32 bits wide");
+                sums.push(total as u32);
+            }
+            sums
+        };
+        let first_part = running(&|m| m.parts.len());
+        let first_draw = running(&|m| m.triangles.len());
+        Self { meshes, mesh_of_object, first_part, first_draw }
+    }
+
+    /// The cut meshes, in the scene's order.
+    #[must_use]
+    pub fn meshes(&self) -> &[Arc<PartedMesh>] {
+        &self.meshes
+    }
+
+    /// How many objects.
+    #[must_use]
+    pub fn object_count(&self) -> u32 {
+        self.mesh_of_object.len() as u32
+    }
+
+    /// How many parts all objects have together.
+    #[must_use]
+    pub fn part_count(&self) -> u32 {
+        self.first_part[self.mesh_of_object.len()]
+    }
+
+    /// How many fragments all objects have together.
+    #[must_use]
+    pub fn fragment_count(&self) -> u32 {
+        self.first_draw[self.mesh_of_object.len()]
+    }
+
+    /// Which of the cut meshes an object shows.
+    #[must_use]
+    pub fn mesh_index(&self, object: ObjectId) -> u32 {
+        self.mesh_of_object[object.0 as usize]
+    }
+
+    /// The cut mesh of an object.
+    #[must_use]
+    pub fn mesh(&self, object: ObjectId) -> &PartedMesh {
+        &self.meshes[self.mesh_of_object[object.0 as usize] as usize]
+    }
+
+    /// The first part id of an object; its parts follow one another.
+    #[must_use]
+    pub fn first_part(&self, object: ObjectId) -> PartId {
+        PartId(self.first_part[object.0 as usize])
+    }
+
+    /// The first draw index of an object.
+    #[must_use]
+    pub fn first_draw(&self, object: ObjectId) -> u32 {
+        self.first_draw[object.0 as usize]
+    }
+
+    /// All parts of an object, as ids.
+    pub fn parts_of(&self, object: ObjectId) -> impl Iterator<Item = PartId> + use<> {
+        let at = object.0 as usize;
+        (self.first_part[at]..self.first_part[at + 1]).map(PartId)
+    }
+
+    /// The object of a part and the part's number in it.
+    ///
+    /// # Panics
+    /// For an id beyond the last part.
+    #[must_use]
+    pub fn locate(&self, part: PartId) -> (ObjectId, u32) {
+        assert!(part.0 < self.part_count(), "part {} of {}", part.0, self.part_count());
+        let object = self.first_part.partition_point(|&first| first <= part.0) - 1;
+        (ObjectId(object as u32), part.0 - self.first_part[object])
+    }
+
+    /// The part that holds the fragment with this draw index.
+    ///
+    /// # Panics
+    /// For an index beyond the last fragment.
+    #[must_use]
+    pub fn part_of_draw(&self, draw: u32) -> PartId {
+        assert!(draw < self.fragment_count(), "draw {draw} of {}", self.fragment_count());
+        let object = self.first_draw.partition_point(|&first| first <= draw) - 1;
+        let mesh = self.mesh(ObjectId(object as u32));
+        let local = mesh.part_of_rank[(draw - self.first_draw[object]) as usize];
+        PartId(self.first_part[object] + local)
+    }
+}
