@@ -1,11 +1,12 @@
-//! Boxes, planes, the frustum, projection with its error bounds, outward rounding and deterministic
-//! trigonometry. Everything here is plain arithmetic in `f64` and must not know scenes.
+//! Boxes, clip-space boxes with their error bounds, outward rounding and deterministic trigonometry.
+//! Everything here is plain arithmetic in `f64` and must not know scenes.
 
 mod aabb;
-mod frustum;
-mod project;
+mod clip_box;
+mod clip_error;
 mod trig;
 
-pub use aabb::Aabb;
-
+pub use aabb::{Aabb, TRANSFORM_MARGIN};
+pub use clip_box::{ClipBox, DEPTH_ROUNDING, PixelRectangle, Projection, RECTANGLE_DILATION_PIXELS};
+pub use clip_error::{CLIP_ERROR_GAMMA, ClipError, rounded_clip_matrix};
 pub use trig::{cos, sin, tan};

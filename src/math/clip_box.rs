@@ -1,0 +1,138 @@
+//! A box seen in clip space: whether it is outside the frustum, and the rectangle and nearest depth
+//! that nothing inside it can exceed.
+//!
+//! # Why the rectangle is conservative
+//! Let every clip coordinate of the contents be within [`ClipError`] of the exact one. With w ≥
+//! `w_min` > 0 over the box, x/w moves by at most (eₓ + |x/w|·e_w) / (w_min − e_w). The exact x/w of a
+//! point in a convex box is bounded by those of its corners. Window arithmetic (reciprocal, product,
+//! scale, offset: four f32 roundings within the guard band of 2¹⁵ pixels) adds under 2⁻⁷ pixel, and
+//! snapping 2⁻⁹; both are far below [`RECTANGLE_DILATION_PIXELS`]. A triangle whose corners each moved
+//! by at most δ lies within δ of the exact one, so no sample outside the dilated rectangle is covered.
+//! Depth at a sample is a convex combination of vertex depths and monotonically rounded, so it is
+//! never below the smallest vertex depth.
+
+use glam::{DMat4, DVec4};
+
+use super::{Aabb, ClipError};
+use crate::math::clip_error::absolute;
+
+/// Dilation of a projected box beyond its transform bound, for window arithmetic (2⁻⁷ pixel) and
+/// snapping (2⁻⁹ pixel) of the reference, and the coarser snapping (down to 4 sub-pixel bits, 2⁻⁵
+/// pixel) of a device: one whole pixel holds them all.
+pub const RECTANGLE_DILATION_PIXELS: f64 = 1.0;
+/// What z·(1/w) may lose: reciprocal and product, one f32 rounding each of a value in [0, 1], and one
+/// for the final rounding of an interpolated depth, doubled for the order of the bound itself.
+pub const DEPTH_ROUNDING: f64 = 6.0 * (f32::EPSILON as f64 / 2.0);
+/// Rounding of a corner's own transform in f64: four products and three additions, doubled.
+const CORNER_GAMMA: f64 = 8.0 * (f64::EPSILON / 2.0);
+
+/// A half-open rectangle of whole pixels, never empty, row 0 on top.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelRectangle {
+    /// First column and row.
+    pub min: [u32; 2],
+    /// One beyond the last column and row.
+    pub max: [u32; 2],
+}
+
+impl PixelRectangle {
+    /// Whether the two share a pixel.
+    #[must_use]
+    pub fn overlaps(&self, other: &Self) -> bool {
+        (0..2).all(|i| self.min[i] < other.max[i] && other.min[i] < self.max[i])
+    }
+}
+
+/// Where the contents of a box can appear.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// On no sample at all.
+    Nowhere,
+    /// It reaches the near plane or the smallest w, holds the eye or is not finite: to be taken for
+    /// visible.
+    Unbounded,
+    /// Within the rectangle and nowhere nearer than the depth, which is in [0, 1].
+    Within {
+        /// Pixels that can be touched.
+        rectangle: PixelRectangle,
+        /// Nearest depth, rounded down.
+        depth: f32,
+    },
+}
+
+/// The corners of a box in clip space with the bound on its contents' error.
+#[derive(Clone, Copy, Debug)]
+pub struct ClipBox {
+    corners: [DVec4; 8],
+    error: [f64; 4],
+}
+
+impl ClipBox {
+    /// Transforms `aabb` by `clip_from_box`. `error` is the bound of what the box contains.
+    #[must_use]
+    pub fn new(aabb: &Aabb, clip_from_box: &DMat4, error: &ClipError) -> Self {
+        let corners = aabb.corners().map(|corner| *clip_from_box * corner.extend(1.0));
+        let own = absolute(clip_from_box) * aabb.max_abs().extend(1.0) * CORNER_GAMMA;
+        Self { corners, error: std::array::from_fn(|i| error.bound[i] + own[i]) }
+    }
+
+    /// Whether the box, moved outward by its error, lies wholly beyond one of the six planes. Any NaN
+    /// makes this false.
+    #[must_use]
+    pub fn outside_frustum(&self) -> bool {
+        let [ex, ey, ez, ew] = self.error;
+        let beyond = |inside: &dyn Fn(&DVec4) -> f64, margin: f64| {
+            self.corners.iter().all(|corner| inside(corner) + margin < 0.0)
+        };
+        beyond(&|c| c.w + c.x, ex + ew)
+            || beyond(&|c| c.w - c.x, ex + ew)
+            || beyond(&|c| c.w + c.y, ey + ew)
+            || beyond(&|c| c.w - c.y, ey + ew)
+            || beyond(&|c| c.z, ez)
+            || beyond(&|c| c.w - c.z, ez + ew)
+    }
+
+    /// The rectangle and nearest depth of the contents in a viewport of `width` × `height` pixels.
+    #[must_use]
+    pub fn project(&self, width: u32, height: u32) -> Projection {
+        if self.outside_frustum() {
+            return Projection::Nowhere;
+        }
+        let [ex, ey, ez, ew] = self.error;
+        let w_min = self.corners.iter().fold(f64::INFINITY, |w, c| w.min(c.w)) - ew;
+        let z_min = self.corners.iter().fold(f64::INFINITY, |z, c| z.min(c.z)) - ez;
+        // Written so that NaN falls out here: "cannot project" means visible.
+        if !(w_min > 0.0 && z_min > 0.0 && self.corners.iter().all(|c| c.is_finite())) {
+            return Projection::Unbounded;
+        }
+        let axis = |component: usize, e: f64, pixels: u32, sign: f64| {
+            let half = f64::from(pixels) * 0.5;
+            let (mut low, mut high, mut reach) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
+            for corner in &self.corners {
+                let ratio = corner[component] / corner.w;
+                reach = reach.max(ratio.abs());
+                let window = ratio * sign * half + half;
+                low = low.min(window);
+                high = high.max(window);
+            }
+            let margin = (e + reach * ew) / w_min * half + RECTANGLE_DILATION_PIXELS;
+            let clamp = |pixel: f64| pixel.clamp(0.0, f64::from(pixels)) as u32;
+            (clamp((low - margin).floor()), clamp((high + margin).ceil()))
+        };
+        let (x0, x1) = axis(0, ex, width, 1.0);
+        let (y0, y1) = axis(1, ey, height, -1.0);
+        if x0 >= x1 || y0 >= y1 {
+            return Projection::Nowhere;
+        }
+        let nearest = self.corners.iter().fold(1.0_f64, |z, c| z.min(c.z / c.w));
+        let depth = floor_f32(nearest - (ez + ew) / w_min - DEPTH_ROUNDING);
+        let rectangle = PixelRectangle { min: [x0, y0], max: [x1, y1] };
+        Projection::Within { rectangle, depth: depth.clamp(0.0, 1.0) }
+    }
+}
+
+/// The largest f32 that is not above `value`.
+fn floor_f32(value: f64) -> f32 {
+    let rounded = value as f32;
+    if f64::from(rounded) > value { rounded.next_down() } else { rounded }
+}

@@ -1,0 +1,78 @@
+//! How far the reference's (and a device's) f32 clip coordinates may stand from the exact ones: a
+//! running error bound in the sense of Higham, *Accuracy and Stability of Numerical Algorithms*,
+//! section 3.3, taken from the coordinates that a box contains.
+
+use glam::{DMat4, DVec3};
+
+/// Unit roundoff of f32.
+const F32_ROUNDOFF: f64 = (f32::EPSILON / 2.0) as f64;
+/// Unit roundoff of f64.
+const F64_ROUNDOFF: f64 = f64::EPSILON / 2.0;
+/// Roundings behind one clip coordinate: one for the matrix entry, one for the product and three
+/// additions make the five of the transform; clipping against six planes moves a new vertex off its
+/// exact edge by the three operations of `out + t·(in − out)`, at most six times over.
+const ROUNDINGS: f64 = 5.0 + 6.0 * 3.0;
+/// γ₂₃ = n·u / (1 − n·u) for f32 and the [`ROUNDINGS`] above.
+///
+/// A clip coordinate is Σ mⱼ·vⱼ; each term passes through at most n roundings, so the computed sum
+/// differs from the exact one by at most γₙ·Σ|mⱼ||vⱼ|. A vertex made by clipping lies on the segment
+/// of two such vertices (an error of t only slides it along the edge), hence under the same sum.
+pub const CLIP_ERROR_GAMMA: f64 = ROUNDINGS * F32_ROUNDOFF / (1.0 - ROUNDINGS * F32_ROUNDOFF);
+/// Composing two affine or projective matrices in f64 rounds each term at most four times (γ₄), and
+/// the second product of view and projection as often again: eight units of the *absolute* product,
+/// which stays large where a camera and an object far from the origin cancel.
+const COMPOSITION_GAMMA: f64 = 8.0 * F64_ROUNDOFF / (1.0 - 8.0 * F64_ROUNDOFF);
+/// Gradual underflow adds at most 2⁻¹⁵⁰ a rounding in f32; 2⁻¹⁴⁰ covers all of [`ROUNDINGS`].
+const UNDERFLOW: f64 = 1.0 / ((1_u128 << 70) as f64 * (1_u128 << 70) as f64);
+
+/// Absolute bounds on the error of the four clip coordinates of anything inside a box.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ClipError {
+    /// Bound on |Δx|, |Δy|, |Δz|, |Δw|, in clip units, each ≥ 0.
+    pub bound: [f64; 4],
+}
+
+impl ClipError {
+    /// No error at all; the identity of [`ClipError::max`].
+    pub const ZERO: Self = Self { bound: [0.0; 4] };
+
+    /// The bound for contents whose object-space coordinates reach at most `reach` from zero, under
+    /// `clip_from_world · world_from_object` rounded to f32. NaN or infinite input gives a bound that
+    /// is not finite, and whatever carries it counts as visible.
+    #[must_use]
+    pub fn of(clip_from_world: &DMat4, world_from_object: &DMat4, reach: DVec3) -> Self {
+        let product = *clip_from_world * *world_from_object;
+        let magnitude = absolute(clip_from_world) * absolute(world_from_object);
+        let reach = reach.extend(1.0);
+        let rounded = absolute(&product) * reach;
+        let composed = magnitude * reach;
+        let bound = std::array::from_fn(|i| {
+            CLIP_ERROR_GAMMA * rounded[i] + COMPOSITION_GAMMA * composed[i] + UNDERFLOW
+        });
+        Self { bound }
+    }
+
+    /// The bound that holds for the contents of both. NaN wins.
+    #[must_use]
+    pub fn max(&self, other: &Self) -> Self {
+        let larger = |a: f64, b: f64| if a >= b || a.is_nan() { a } else { b };
+        Self { bound: std::array::from_fn(|i| larger(self.bound[i], other.bound[i])) }
+    }
+}
+
+/// Absolute value of every entry.
+pub(super) fn absolute(matrix: &DMat4) -> DMat4 {
+    DMat4::from_cols(
+        matrix.x_axis.abs(),
+        matrix.y_axis.abs(),
+        matrix.z_axis.abs(),
+        matrix.w_axis.abs(),
+    )
+}
+
+/// The object-to-clip matrix as the truth and the devices take it: composed in f64, each entry
+/// rounded to f32 once, column-major.
+#[must_use]
+pub fn rounded_clip_matrix(clip_from_object: &DMat4) -> [f32; 16] {
+    clip_from_object.to_cols_array().map(|entry| entry as f32)
+}
