@@ -1,1 +1,107 @@
-//! Stub.
+//! Cullers: the per-frame algorithms. Each walks an index (or nothing) by its own policy, asks an
+//! oracle through the [`Pen`], and draws the parts it takes for visible. One frame loop per file
+//! behind [`Culler`]; `draw_all` is the stupid one. A culler must not know the truth.
+
+mod draw_all;
+mod full;
+mod pen;
+mod scenery;
+mod simple;
+mod view;
+mod view_frustum;
+
+use std::sync::Arc;
+
+use crate::index::Index;
+use crate::oracle::OracleError;
+use crate::part::Partition;
+
+pub use draw_all::DrawAll;
+pub use full::{Full, FullKnobs};
+pub use pen::{Counts, Pen};
+pub use scenery::{Item, Scenery};
+pub use simple::Simple;
+pub use view::{ObjectView, View};
+pub use view_frustum::ViewFrustum;
+
+/// Which stand-in is asked about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ProxyKind {
+    /// The projected corners' rectangle at the nearest depth: the provable one.
+    #[default]
+    Rectangle,
+    /// The box itself, inflated, with interpolated depth.
+    Box,
+}
+
+/// A per-frame culling algorithm.
+pub trait Culler {
+    /// Name for reports and replay lines.
+    fn name(&self) -> &str;
+
+    /// Draws one frame: every part that may be visible goes to [`Pen::draw`]. Frames come in order,
+    /// from 0 on.
+    ///
+    /// # Errors
+    /// What the oracle said, passed on.
+    fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError>;
+
+    /// Whether every structural promise of the culler and its index holds.
+    ///
+    /// # Errors
+    /// The first broken promise, in words.
+    fn check(&self) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+/// What a culler is made from.
+pub struct CullerSetup {
+    /// The parts of the scene's objects.
+    pub partition: Arc<Partition>,
+    /// An index over the objects of frame 0.
+    pub index: Box<dyn Index>,
+    /// What to ask about.
+    pub proxy: ProxyKind,
+}
+
+/// A member of the family.
+#[derive(Clone, Copy, Debug)]
+pub struct CullerKind {
+    /// Name for flags and reports.
+    pub name: &'static str,
+    /// One line for `list`.
+    pub summary: &'static str,
+    /// Whether it ever asks; one that does not needs no oracle of its own.
+    pub asks: bool,
+    /// Makes one.
+    pub make: fn(CullerSetup) -> Box<dyn Culler>,
+}
+
+/// Every culler there is.
+pub const CULLERS: &[CullerKind] = &[
+    CullerKind {
+        name: "full",
+        summary: "Kovalčík & Sochor 2006: parallel queries, recent results postpone the next query",
+        asks: true,
+        make: |setup| Box::new(Full::new(setup, FullKnobs::default())),
+    },
+    CullerKind {
+        name: "simple",
+        summary: "a query for every node in the frustum, one at a time",
+        asks: true,
+        make: |setup| Box::new(Simple::new(setup)),
+    },
+    CullerKind {
+        name: "vfc",
+        summary: "view-frustum culling over the same trees, no queries",
+        asks: false,
+        make: |setup| Box::new(ViewFrustum::new(setup)),
+    },
+    CullerKind {
+        name: "draw-all",
+        summary: "draws every part: always safe, always last",
+        asks: false,
+        make: |setup| Box::new(DrawAll::new(setup)),
+    },
+];

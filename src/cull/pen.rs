@@ -1,0 +1,97 @@
+//! The pen: what a culler draws and asks with. It hands everything on to the oracle and keeps the
+//! record that the trace is made of.
+
+use crate::oracle::{Answer, Oracle, OracleError, Proxy, QueryId};
+use crate::part::PartId;
+
+/// What one frame cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Questions asked.
+    pub queries: u64,
+    /// Answers that were "visible".
+    pub visible_answers: u64,
+    /// Times the culler waited for answers.
+    pub round_trips: u64,
+}
+
+/// Draws, asks, and remembers.
+pub struct Pen<'a> {
+    oracle: &'a mut dyn Oracle,
+    drawn: Vec<PartId>,
+    already: Vec<bool>,
+    counts: Counts,
+    events_hash: u64,
+}
+
+impl<'a> Pen<'a> {
+    /// A pen for one frame of `part_count` parts.
+    pub fn new(oracle: &'a mut dyn Oracle, part_count: u32) -> Self {
+        Self {
+            oracle,
+            drawn: Vec::new(),
+            already: vec![false; part_count as usize],
+            counts: Counts::default(),
+            events_hash: 0xcbf2_9ce4_8422_2325,
+        }
+    }
+
+    /// Draws a part at this point of the stream; a part drawn before in the frame is not drawn again.
+    ///
+    /// # Panics
+    /// For an id beyond the last part.
+    pub fn draw(&mut self, part: PartId) {
+        if !std::mem::replace(&mut self.already[part.0 as usize], true) {
+            self.note(1, u64::from(part.0));
+            self.drawn.push(part);
+            self.oracle.draw_part(part);
+        }
+    }
+
+    /// Asks whether any sample of `proxy` would pass against what was drawn so far.
+    pub fn ask(&mut self, proxy: &Proxy) -> QueryId {
+        self.counts.queries += 1;
+        let query = self.oracle.ask(proxy);
+        self.note(2, u64::from(query.0));
+        if let Proxy::Rectangle { min, max, depth } = proxy {
+            self.note(3, u64::from(min[0]) << 32 | u64::from(min[1]));
+            self.note(3, u64::from(max[0]) << 32 | u64::from(max[1]));
+            self.note(3, u64::from(depth.to_bits()));
+        }
+        query
+    }
+
+    /// Ends the batch, waits, and appends its answers in asking order.
+    ///
+    /// # Errors
+    /// What the oracle said.
+    pub fn round_trip(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
+        self.counts.round_trips += 1;
+        let before = answers.len();
+        self.oracle.submit()?;
+        self.oracle.collect(answers)?;
+        for answer in &answers[before..] {
+            self.counts.visible_answers += u64::from(answer.visible);
+            self.note(4, u64::from(answer.query.0) << 1 | u64::from(answer.visible));
+        }
+        Ok(())
+    }
+
+    /// Ends the frame: the parts drawn in drawing order, the counts, and a hash of every draw,
+    /// question and answer in order.
+    ///
+    /// # Errors
+    /// What the oracle said to the last batch.
+    pub fn finish(self) -> Result<(Vec<PartId>, Counts, u64), OracleError> {
+        self.oracle.submit()?;
+        self.oracle.collect(&mut Vec::new())?;
+        Ok((self.drawn, self.counts, self.events_hash))
+    }
+
+    /// FNV-1a over whole words.
+    fn note(&mut self, kind: u64, value: u64) {
+        for word in [kind, value] {
+            self.events_hash = (self.events_hash ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! `vfc`, the paper's "VFC only": frustum culling over the same two levels, no questions. What it
+//! draws is the ceiling of what occlusion culling can save.
+
+use super::{Culler, CullerSetup, Item, Pen, Scenery, View};
+use crate::index::NodeId;
+use crate::oracle::OracleError;
+
+/// View-frustum culling.
+pub struct ViewFrustum {
+    scenery: Scenery,
+}
+
+impl ViewFrustum {
+    /// Over the index and partition of `setup`.
+    #[must_use]
+    pub fn new(setup: CullerSetup) -> Self {
+        Self { scenery: Scenery::new(setup) }
+    }
+}
+
+impl Culler for ViewFrustum {
+    fn name(&self) -> &str {
+        "vfc"
+    }
+
+    fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
+        self.scenery.begin_frame(view);
+        let mut stack = vec![Item::Scene(NodeId(0))];
+        let mut next = Vec::new();
+        while let Some(item) = stack.pop() {
+            if !self.scenery.outside(view, item) {
+                self.scenery.expand(view, item, pen, &mut next);
+                stack.extend(next.drain(..).rev());
+            }
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), String> {
+        self.scenery.check()
+    }
+}
