@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::{CullerSetup, Pen, ProxyKind, View};
 use crate::index::{Index, NodeId};
-use crate::math::{Aabb, ClipBox, ClipError, PixelRectangle, Projection};
+use crate::math::{self, Aabb, ClipBox, ClipError, PixelRectangle, Projection};
 use crate::oracle::Proxy;
 use crate::part::{ObjectId, PartId, Partition};
 
@@ -148,7 +148,14 @@ impl Scenery {
     fn box_proxy(&self, view: &View<'_>, item: Item) -> Option<Proxy> {
         let Item::Object(object, node) = item else { return None };
         let seen = &view.objects[object.0 as usize];
-        super::view::inflated_box(&self.object_box(object, node), seen, view.viewport)
+        let aabb = self.object_box(object, node);
+        let pixels = (view.viewport.width, view.viewport.height);
+        let grown = math::inflated_box(&aabb, &seen.clip_from_object, &seen.error, pixels)?;
+        Some(Proxy::Box {
+            clip_from_box: math::rounded_clip_matrix(&seen.clip_from_object),
+            min: grown.min.to_array().map(|c| c as f32),
+            max: grown.max.to_array().map(|c| c as f32),
+        })
     }
 
     /// Algorithm 4, `ProcessVisibleNode`: draws what the node holds itself and appends what is to be

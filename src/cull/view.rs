@@ -47,21 +47,3 @@ impl View<'_> {
         ClipBox::new(&view.bounds, &self.clip_from_world, &view.error).outside_frustum()
     }
 }
-
-/// Inflates an object-space box so that, drawn with interpolated depth, it covers every sample of the
-/// contents at no greater depth; `None` where no inflation is enough.
-///
-/// A vertex of the contents may appear moved by the clip error and by
-/// [`RECTANGLE_DILATION_PIXELS`](crate::math::RECTANGLE_DILATION_PIXELS); the box is grown in its own
-/// space until its faces have moved at least that far. One pixel at the greatest depth of the box is
-/// `2·w_max/pixels` clip units; the smallest stretch of the map from box to clip space turns both into
-/// object units. Depth errors (the clip error in z, and `DEPTH_SLACK` of interpolation on the
-/// device) are turned likewise through the smallest depth slope.
-pub(super) fn inflated_box(
-    aabb: &Aabb,
-    seen: &ObjectView,
-    viewport: Viewport,
-) -> Option<crate::oracle::Proxy> {
-    let _ = (aabb, seen, viewport);
-    None
-}

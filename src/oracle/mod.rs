@@ -9,7 +9,7 @@
 //! asking order, so that no culler sees arrival times. An answer may err only towards "visible".
 
 mod always;
-pub mod sim;
+mod sim;
 #[cfg(feature = "hardware")]
 pub mod wgpu;
 
@@ -19,6 +19,7 @@ use crate::part::{PartId, Partition};
 use crate::scene::Viewport;
 
 pub use always::Always;
+pub use sim::{Sim, part_draw};
 
 
 /// What an oracle is told at the start of a frame.

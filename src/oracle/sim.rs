@@ -1,1 +1,145 @@
-//! Stub.
+//! The simulated device: the reference rasterizer behind the command stream. It answers every
+//! question exactly and at once; draws between two questions go to the renderer together.
+
+use std::collections::VecDeque;
+
+use plainsight_reference::{Draw, Image, fast};
+
+use super::{Answer, FrameView, Oracle, OracleError, Proxy, QueryId, ReadBack, Stage};
+use crate::part::{PartId, Partition};
+
+/// The reference z-buffer as an oracle.
+pub struct Sim {
+    stage: Stage,
+    image: Image,
+    matrices: Vec<[f32; 16]>,
+    waiting: Vec<PartId>,
+    asked: u32,
+    open: Vec<Answer>,
+    submitted: VecDeque<Vec<Answer>>,
+}
+
+/// What the renderer needs of one part.
+///
+/// # Panics
+/// For a part or an object that does not exist.
+#[must_use]
+pub fn part_draw<'a>(partition: &'a Partition, part: PartId, matrices: &[[f32; 16]]) -> Draw<'a> {
+    let (object, local) = partition.locate(part);
+    let mesh = partition.mesh(object);
+    let this = &mesh.parts[local as usize];
+    let vertices = this.first_vertex as usize..(this.first_vertex + this.vertex_count) as usize;
+    let triangles =
+        this.first_triangle as usize..(this.first_triangle + this.triangle_count) as usize;
+    Draw {
+        positions: &mesh.positions[vertices],
+        triangles: &mesh.triangles[triangles.clone()],
+        ranks: &mesh.ranks[triangles],
+        first_draw: partition.first_draw(object),
+        clip_from_object: matrices[object.0 as usize],
+    }
+}
+
+impl Sim {
+    /// An image of its own over the stage.
+    #[must_use]
+    pub fn new(stage: Stage) -> Self {
+        let image = Image::new(stage.viewport);
+        Self {
+            stage,
+            image,
+            matrices: Vec::new(),
+            waiting: Vec::new(),
+            asked: 0,
+            open: Vec::new(),
+            submitted: VecDeque::new(),
+        }
+    }
+
+    fn flush(&mut self) {
+        let Self { stage, image, matrices, waiting, .. } = self;
+        if !waiting.is_empty() {
+            let draws: Vec<Draw<'_>> =
+                waiting.iter().map(|&part| part_draw(&stage.partition, part, matrices)).collect();
+            fast::draw_all(image, &draws);
+            waiting.clear();
+        }
+    }
+}
+
+impl Oracle for Sim {
+    fn name(&self) -> &'static str {
+        "sim"
+    }
+
+    fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {
+        self.image.clear();
+        self.matrices.clear();
+        self.matrices.extend_from_slice(view.clip_from_object);
+        self.waiting.clear();
+        self.asked = 0;
+        self.open.clear();
+        self.submitted.clear();
+        Ok(())
+    }
+
+    fn draw_part(&mut self, part: PartId) {
+        self.waiting.push(part);
+    }
+
+    fn ask(&mut self, proxy: &Proxy) -> QueryId {
+        self.flush();
+        let visible = match *proxy {
+            Proxy::Rectangle { min, max, depth } => self.image.any_rectangle(min, max, depth),
+            Proxy::Box { clip_from_box, min, max } => {
+                let (positions, triangles) = box_triangles(min, max);
+                let ranks: [u32; 12] = std::array::from_fn(|i| i as u32);
+                let draw = Draw {
+                    positions: &positions,
+                    triangles: &triangles,
+                    ranks: &ranks,
+                    first_draw: 0,
+                    clip_from_object: clip_from_box,
+                };
+                fast::count(&self.image, &draw) > 0
+            }
+        };
+        let query = QueryId(self.asked);
+        self.asked += 1;
+        self.open.push(Answer { query, visible });
+        query
+    }
+
+    fn submit(&mut self) -> Result<(), OracleError> {
+        self.submitted.push_back(std::mem::take(&mut self.open));
+        Ok(())
+    }
+
+    fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
+        answers.extend(self.submitted.pop_front().unwrap_or_default());
+        Ok(())
+    }
+
+    fn read_back(&mut self) -> Result<Option<ReadBack>, OracleError> {
+        self.flush();
+        Ok(Some(ReadBack { depth: self.image.depths().collect(), parts: None }))
+    }
+
+    fn redraw(&mut self, _: &[PartId]) -> Result<Option<ReadBack>, OracleError> {
+        Ok(None)
+    }
+}
+
+/// The twelve triangles of a box; corner bit 0 is x, bit 1 y, bit 2 z.
+#[must_use]
+pub fn box_triangles(min: [f32; 3], max: [f32; 3]) -> ([[f32; 3]; 8], [[u32; 3]; 12]) {
+    let corner = |i: usize| std::array::from_fn(|axis| if i >> axis & 1 == 0 { min } else { max }[axis]);
+    let faces: [[u32; 4]; 6] =
+        [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
+    let triangle = |i: usize| {
+        let [a, b, c, d] = faces[i / 2];
+        if i.is_multiple_of(2) { [a, b, c] } else { [a, c, d] }
+    };
+    (std::array::from_fn(corner), std::array::from_fn(triangle))
+}
+

@@ -1,1 +1,22 @@
-//! Stub.
+//! Scene + culler + oracle to a trace. The truth is rendered once per frame and shared by all lanes
+//! that run side by side; each finished frame is handed to the lane's observers and then forgotten.
+//! It must not know the checks: an observer is anything that implements [`Observer`].
+
+mod frame;
+mod lane;
+mod trace;
+mod truth;
+
+pub use frame::{FrameState, World};
+pub use lane::{Lane, LaneInfo, Observer, RunError, run};
+pub use trace::{DeviceImages, FrameRecord, FrameTrace, Trace};
+pub use truth::{Truth, render};
+
+/// FNV-1a over whole words with a rotation, the hash of everything a trace compares.
+#[must_use]
+pub fn fold(hash: u64, word: u64) -> u64 {
+    (hash ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29)
+}
+
+/// Where a chain of [`fold`]s begins.
+pub const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;

@@ -1,0 +1,53 @@
+//! **set**: no part that shows a sample is missing from what was drawn, in any frame. At tolerance
+//! zero every visible part is a *must*.
+
+use crate::part::PartId;
+use crate::run::FrameRecord;
+
+/// A visible part that was not drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Miss {
+    /// The frame.
+    pub frame: u32,
+    /// The part.
+    pub part: PartId,
+    /// How many samples show it.
+    pub pixels: u32,
+    /// Column and row of the first of them, row 0 on top.
+    pub first_pixel: [u32; 2],
+}
+
+/// Lists the misses.
+#[derive(Clone, Debug, Default)]
+pub struct Conservative {
+    misses: Vec<Miss>,
+}
+
+impl Conservative {
+    /// Compares one frame.
+    pub fn frame(&mut self, record: &FrameRecord<'_>) {
+        let truth = record.truth;
+        let mut drawn = vec![false; truth.visible_pixels.len()];
+        for part in record.drawn {
+            drawn[part.0 as usize] = true;
+        }
+        for (part, &pixels) in truth.visible_pixels.iter().enumerate() {
+            if pixels > 0 && !drawn[part] {
+                let part = PartId(part as u32);
+                let shows = |sample: &usize| truth.part_at(record.world, *sample) == Some(part);
+                let sample = (0..truth.image.samples().len())
+                    .find(shows)
+                    .expect("a part with visible pixels shows at a sample");
+                let width = truth.image.viewport().width;
+                let first_pixel = [sample as u32 % width, sample as u32 / width];
+                self.misses.push(Miss { frame: record.state.frame, part, pixels, first_pixel });
+            }
+        }
+    }
+
+    /// Every miss, in order of frames, then parts.
+    #[must_use]
+    pub fn misses(&self) -> &[Miss] {
+        &self.misses
+    }
+}

@@ -1,0 +1,147 @@
+//! The gate: all checks of one lane, and the short way to put a culler of one's own through them.
+
+use std::fmt;
+
+use super::{Conservative, CountsCheck, Determinism, DeviceImage, Excess, ImageCheck};
+use crate::cull::{Culler, CullerSetup, ProxyKind};
+use crate::index::INDEXES;
+use crate::oracle::{Oracle, Sim, Stage};
+use crate::part::PartitionKnobs;
+use crate::run::{self, FrameRecord, FrameTrace, Lane, LaneInfo, Observer, RunError, Trace, World};
+use crate::scene::Scene;
+
+/// Misses named in full before the rest is only counted.
+const NAMED_MISSES: usize = 8;
+/// Frames that [`judge`] runs a second time.
+const REPEATED_FRAMES: u32 = 2;
+
+/// Every check of one lane.
+#[derive(Default)]
+pub struct Gate {
+    /// No visible part is missing.
+    pub conservative: Conservative,
+    /// The reference's images are equal.
+    pub image: ImageCheck,
+    /// The device's images are equal.
+    pub device_image: DeviceImage,
+    /// Repetition leaves the same trace.
+    pub determinism: Determinism,
+    /// What was spent.
+    pub counts: CountsCheck,
+    /// What was drawn in vain.
+    pub excess: Excess,
+}
+
+impl Observer for Gate {
+    fn frame(&mut self, record: &FrameRecord<'_>) {
+        self.conservative.frame(record);
+        self.image.frame(record);
+        self.device_image.frame(record);
+        self.counts.frame(record);
+        self.excess.frame(record);
+    }
+
+    fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
+        self.determinism.repeated(first, again);
+    }
+}
+
+impl Gate {
+    /// Whether everything held.
+    #[must_use]
+    pub fn held(&self) -> bool {
+        self.failures().is_empty()
+    }
+
+    /// Each failure as a line: frame, part, pixel.
+    #[must_use]
+    pub fn failures(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        let misses = self.conservative.misses();
+        for miss in misses.iter().take(NAMED_MISSES) {
+            let [x, y] = miss.first_pixel;
+            lines.push(format!(
+                "set: frame {} part {} is visible in {} pixels, first at ({x}, {y}), and was not drawn",
+                miss.frame, miss.part.0, miss.pixels
+            ));
+        }
+        if misses.len() > NAMED_MISSES {
+            lines.push(format!("set: {} more misses", misses.len() - NAMED_MISSES));
+        }
+        let images = [("image", self.image.differences()), ("device image", self.device_image.differences())];
+        for (check, differences) in images {
+            if let Some(first) = differences.first() {
+                let [x, y] = first.first_pixel;
+                lines.push(format!(
+                    "{check}: {} frames differ, first frame {} in {} pixels, first at ({x}, {y})",
+                    differences.len(),
+                    first.frame,
+                    first.pixels
+                ));
+            }
+        }
+        if let Some(frame) = self.determinism.first_difference() {
+            lines.push(format!("determinism: frame {frame} left another trace when run again"));
+        }
+        if let Some(frame) = self.counts.overcounted() {
+            lines.push(format!("counts: frame {frame} has more answers than questions"));
+        }
+        lines
+    }
+}
+
+/// What the gate says of one lane; prints as a few lines.
+pub struct Verdict {
+    /// The record.
+    pub trace: Trace,
+    /// The checks.
+    pub gate: Gate,
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let lane = &self.trace.lane;
+        let word = if self.gate.held() { "held" } else { "failed" };
+        let (drawn, visible) = (self.gate.excess.drawn(), self.gate.excess.visible());
+        let queries = self.gate.counts.total().queries;
+        write!(
+            f,
+            "{word}: {} on {}, {} frames, drew {drawn} parts where {visible} are visible, {queries} queries",
+            lane.culler,
+            lane.oracle,
+            self.trace.frames.len()
+        )?;
+        self.gate.failures().iter().try_for_each(|line| write!(f, "\n  {line}"))
+    }
+}
+
+/// Puts a culler through the gate: every frame of `scene` on the simulated device, over the first
+/// index of [`INDEXES`], the first frames twice.
+///
+/// # Errors
+/// What the oracle said; the simulated device never gives up.
+pub fn judge(
+    scene: Scene,
+    make: impl Fn(CullerSetup) -> Box<dyn Culler>,
+) -> Result<Verdict, RunError> {
+    let frames = scene.frames;
+    let world = World::new(scene, PartitionKnobs::default());
+    let entries = world.entries();
+    let culler = || {
+        make(CullerSetup {
+            partition: world.partition.clone(),
+            index: (INDEXES[0].build)(&entries),
+            proxy: ProxyKind::Rectangle,
+        })
+    };
+    let stage = Stage { partition: world.partition.clone(), viewport: world.scene.viewport };
+    let oracle: Box<dyn Oracle> = Box::new(Sim::new(stage));
+    let name = culler().name().to_owned();
+    let replay = format!("scene {} seed {} culler {name}", world.scene.name, world.scene.seed);
+    let info = LaneInfo { culler: name, oracle: oracle.name(), device: None, replay };
+    let mut gate = Gate::default();
+    let lane = Lane { info, culler: Box::new(culler), oracle, observer: &mut gate };
+    let mut traces = run::run(&world, frames, REPEATED_FRAMES, &mut [lane], &mut || true)?;
+    let trace = traces.pop().expect("one lane leaves one trace");
+    Ok(Verdict { trace, gate })
+}

@@ -1,0 +1,62 @@
+//! **image**: the reference's image of the drawn parts equals its image of all parts, bit for bit.
+
+use plainsight_reference::Image;
+
+use crate::run::{FrameRecord, render};
+
+/// A sample where two images differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// The frame.
+    pub frame: u32,
+    /// How many samples differ.
+    pub pixels: u32,
+    /// Column and row of the first of them, row 0 on top.
+    pub first_pixel: [u32; 2],
+}
+
+impl Difference {
+    /// Counts the samples of a frame that `differ` picks; `None` for none.
+    pub(super) fn find(
+        record: &FrameRecord<'_>,
+        mut differ: impl FnMut(usize) -> bool,
+    ) -> Option<Self> {
+        let viewport = record.truth.image.viewport();
+        let mut first = None;
+        let mut pixels = 0;
+        for sample in 0..(viewport.width * viewport.height) as usize {
+            if differ(sample) {
+                pixels += 1;
+                first.get_or_insert(sample as u32);
+            }
+        }
+        let first = first?;
+        let first_pixel = [first % viewport.width, first / viewport.width];
+        Some(Self { frame: record.state.frame, pixels, first_pixel })
+    }
+}
+
+/// Renders what was drawn and compares.
+#[derive(Default)]
+pub struct ImageCheck {
+    image: Option<Image>,
+    differences: Vec<Difference>,
+}
+
+impl ImageCheck {
+    /// Compares one frame.
+    pub fn frame(&mut self, record: &FrameRecord<'_>) {
+        let image = self.image.get_or_insert_with(|| Image::new(record.world.scene.viewport));
+        render(record.world, record.state, record.drawn, image);
+        let (drawn, all) = (image.samples(), record.truth.image.samples());
+        if drawn != all {
+            self.differences.extend(Difference::find(record, |i| drawn[i] != all[i]));
+        }
+    }
+
+    /// The frames that differ.
+    #[must_use]
+    pub fn differences(&self) -> &[Difference] {
+        &self.differences
+    }
+}

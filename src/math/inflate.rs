@@ -1,0 +1,63 @@
+//! The inflation that lets a box, drawn with interpolated depth, stand in for its contents.
+//!
+//! # Derivation
+//! A point v of the box has clip coordinates c = M·(v, 1). What is drawn of it may appear at c + e
+//! with |e| bounded per coordinate: the contents' and the proxy's own clip error (twice
+//! [`ClipError`]), one pixel of window arithmetic and snapping at w, and [`BOX_DEPTH_SLACK`] of depth
+//! at w. Then M⁻¹(c + e) = (v + a, 1 + b) with |a| ≤ |M⁻¹|·|e| in the first three rows and |b| likewise
+//! in the last, so the point moved by d = (a − b·v) / (1 + b). A box grown by |d| on each axis holds
+//! every such point, and being convex in front of the eye it covers every sample of the contents at a
+//! depth no greater than theirs.
+
+use glam::{DMat4, DVec3, DVec4};
+
+use super::clip_error::absolute;
+use super::{Aabb, ClipError, RECTANGLE_DILATION_PIXELS};
+
+/// Depth by which the faces of a box proxy stand before its contents: 64 ulps of a depth near 1, for
+/// a device that evaluates a plane in f32 (three roundings of terms that stay below the viewport's
+/// size times the slope). It holds for faces that are not nearly edge-on; that is why the rectangle,
+/// which has no slope, is the default.
+pub const BOX_DEPTH_SLACK: f64 = 64.0 * (f32::EPSILON as f64 / 2.0);
+/// Rounding of the inverse and of the products with it; a matrix so ill-conditioned that this does
+/// not hold gives a box that reaches the near plane, hence a rectangle.
+const INVERSE_SLACK: f64 = 2.0;
+/// Largest |b| taken: beyond it 1 + b may come near zero.
+const MOST_PERSPECTIVE_SHIFT: f64 = 0.5;
+
+/// Grows `aabb` as derived above, rounded outward to f32; `None` where the inverse is not finite, the
+/// shift is too large, or the grown box would reach the near plane: ask about the rectangle then.
+#[must_use]
+pub fn inflated_box(
+    aabb: &Aabb,
+    clip_from_box: &DMat4,
+    error: &ClipError,
+    (width, height): (u32, u32),
+) -> Option<Aabb> {
+    let corners = aabb.corners().map(|corner| *clip_from_box * corner.extend(1.0));
+    let w_max = corners.iter().fold(0.0_f64, |w, c| w.max(c.w));
+    let pixel = |pixels: u32| 2.0 * RECTANGLE_DILATION_PIXELS / f64::from(pixels) * w_max;
+    let own = error.bound.map(|bound| 2.0 * bound);
+    let moved = DVec4::new(
+        own[0] + own[3] + pixel(width),
+        own[1] + own[3] + pixel(height),
+        own[2] + own[3] + BOX_DEPTH_SLACK * w_max,
+        own[3],
+    );
+    let shift = absolute(&clip_from_box.inverse()) * moved * INVERSE_SLACK;
+    // Written so that NaN gives up.
+    if !(shift.is_finite() && shift.w <= MOST_PERSPECTIVE_SHIFT) {
+        return None;
+    }
+    let margin = (shift.truncate() + aabb.max_abs() * shift.w) / (1.0 - shift.w);
+    let grown = aabb.grown(margin);
+    let outward = Aabb::new(
+        DVec3::from_array(grown.min.to_array().map(|c| f64::from((c as f32).next_down()))),
+        DVec3::from_array(grown.max.to_array().map(|c| f64::from((c as f32).next_up()))),
+    );
+    let clear = |corner: DVec3| {
+        let clip = *clip_from_box * corner.extend(1.0);
+        clip.z > moved.z && clip.w > moved.w
+    };
+    outward.corners().into_iter().all(clear).then_some(outward)
+}

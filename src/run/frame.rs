@@ -1,0 +1,104 @@
+//! A scene with its parts and effects, and its state at one frame: matrices, boxes, moves.
+
+use std::sync::Arc;
+
+use glam::{DMat4, DVec3};
+
+use crate::cull::{ObjectView, View};
+use crate::effect;
+use crate::index::{Entry, Move};
+use crate::math::{ClipError, rounded_clip_matrix};
+use crate::part::{ObjectId, Partition, PartitionKnobs};
+use crate::scene::{Camera, Scene};
+
+/// A scene ready to run: cut into parts, its declared effects built.
+pub struct World {
+    /// The description.
+    pub scene: Arc<Scene>,
+    /// The parts.
+    pub partition: Arc<Partition>,
+    effects: effect::World,
+}
+
+impl World {
+    /// Cuts the scene's meshes and builds its effects.
+    #[must_use]
+    pub fn new(scene: Scene, knobs: PartitionKnobs) -> Self {
+        let scene = Arc::new(scene);
+        let partition = Arc::new(Partition::new(&scene, knobs));
+        let effects = effect::World::new(&scene);
+        Self { scene, partition, effects }
+    }
+
+    /// What an index is built from: the boxes of frame 0.
+    #[must_use]
+    pub fn entries(&self) -> Vec<Entry> {
+        let state = FrameState::at(self, 0);
+        let bound = |object: usize| self.effects.step_bound(object as u32);
+        let entry = |(object, view): (usize, &ObjectView)| Entry {
+            bounds: view.bounds,
+            step_bound: bound(object),
+        };
+        state.objects.iter().enumerate().map(entry).collect()
+    }
+}
+
+/// Everything about one frame that does not depend on a culler; a pure function of (scene, t).
+pub struct FrameState {
+    /// t.
+    pub frame: u32,
+    /// The camera.
+    pub camera: Camera,
+    /// Clip from world.
+    pub clip_from_world: DMat4,
+    /// Objects as cullers see them.
+    pub objects: Vec<ObjectView>,
+    /// Object-to-clip matrices as renderers take them.
+    pub matrices: Vec<[f32; 16]>,
+    /// What changed since t − 1; empty at t = 0.
+    pub moves: Vec<Move>,
+}
+
+impl FrameState {
+    /// The state of `world` at frame `t`.
+    #[must_use]
+    pub fn at(world: &World, t: u32) -> Self {
+        let camera = world.scene.camera.at(t);
+        let clip_from_world = camera.clip_from_world(world.scene.viewport);
+        let objects: Vec<ObjectView> = (0..world.scene.objects.len() as u32)
+            .map(|object| {
+                let world_from_object = world.effects.placement(object, t).world_from_object();
+                let bounds = world.partition.mesh(ObjectId(object)).bounds;
+                let reach = if bounds.is_empty() { DVec3::ZERO } else { bounds.max_abs() };
+                ObjectView {
+                    bounds: bounds.transformed(&world_from_object),
+                    clip_from_object: clip_from_world * world_from_object,
+                    eye: world_from_object.inverse().transform_point3(camera.eye),
+                    error: ClipError::of(&clip_from_world, &world_from_object, reach),
+                }
+            })
+            .collect();
+        let moved = |&object: &u32| {
+            let bounds = objects[object as usize].bounds;
+            Move { object: ObjectId(object), bounds, jumped: false }
+        };
+        let moves =
+            if t == 0 { Vec::new() } else { world.effects.moving().iter().map(moved).collect() };
+        let matrices = objects.iter().map(|o| rounded_clip_matrix(&o.clip_from_object)).collect();
+        Self { frame: t, camera, clip_from_world, objects, matrices, moves }
+    }
+
+    /// As a culler sees it.
+    #[must_use]
+    pub fn view<'a>(&'a self, world: &'a World) -> View<'a> {
+        View {
+            frame: self.frame,
+            viewport: world.scene.viewport,
+            camera: self.camera,
+            clip_from_world: self.clip_from_world,
+            objects: &self.objects,
+            moves: &self.moves,
+            partition: &world.partition,
+        }
+    }
+}

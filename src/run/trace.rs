@@ -1,0 +1,97 @@
+//! The record of a run, and what observers are shown of each frame.
+
+use super::{FrameState, HASH_START, LaneInfo, Truth, World, fold};
+use crate::cull::Counts;
+use crate::oracle::ReadBack;
+use crate::part::PartId;
+
+/// What a real device drew in one frame.
+pub struct DeviceImages<'a> {
+    /// What the culler's own draws left.
+    pub own: &'a ReadBack,
+    /// The drawn parts again, in draw-index order.
+    pub drawn: &'a ReadBack,
+    /// Every part, in draw-index order.
+    pub all: &'a ReadBack,
+}
+
+/// One finished frame of one lane, lent to the observers.
+pub struct FrameRecord<'a> {
+    /// Which lane.
+    pub lane: &'a LaneInfo,
+    /// The scene.
+    pub world: &'a World,
+    /// The frame.
+    pub state: &'a FrameState,
+    /// The reference's answer.
+    pub truth: &'a Truth,
+    /// Parts drawn, in drawing order, each once.
+    pub drawn: &'a [PartId],
+    /// What it cost.
+    pub counts: Counts,
+    /// What a real device drew; `None` where none did.
+    pub device: Option<DeviceImages<'a>>,
+}
+
+/// What is kept of one frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameTrace {
+    /// t.
+    pub frame: u32,
+    /// Parts drawn.
+    pub drawn_parts: u32,
+    /// Parts the truth shows.
+    pub visible_parts: u32,
+    /// Questions, answers, round trips.
+    pub counts: Counts,
+    /// Hash of every draw, question and answer in order.
+    pub events_hash: u64,
+    /// Hash of the truth's image.
+    pub truth_hash: u64,
+    /// Hash of the depth that the culler's own draws left; 0 where no image is kept.
+    pub image_hash: u64,
+    /// Wall time of the culler's frame, device included, in nanoseconds. Never compared.
+    pub wall_ns: u64,
+}
+
+/// The record of one lane.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    /// Which lane.
+    pub lane: LaneInfo,
+    /// Frame by frame.
+    pub frames: Vec<FrameTrace>,
+}
+
+impl Trace {
+    /// One number for all that must repeat: draws, questions, answers and images of every frame.
+    #[must_use]
+    pub fn hash(&self) -> u64 {
+        self.frames.iter().fold(HASH_START, |hash, frame| frame.fold_into(hash))
+    }
+
+    /// The sum of a figure over the frames.
+    #[must_use]
+    pub fn sum(&self, figure: impl Fn(&FrameTrace) -> u64) -> u64 {
+        self.frames.iter().map(figure).sum()
+    }
+}
+
+impl FrameTrace {
+    /// Adds what must repeat of this frame to `hash`.
+    #[must_use]
+    pub fn fold_into(&self, hash: u64) -> u64 {
+        [
+            u64::from(self.frame),
+            u64::from(self.drawn_parts),
+            self.counts.queries,
+            self.counts.visible_answers,
+            self.counts.round_trips,
+            self.events_hash,
+            self.truth_hash,
+            self.image_hash,
+        ]
+        .into_iter()
+        .fold(hash, fold)
+    }
+}

@@ -1,0 +1,52 @@
+//! The truth of one frame: the reference's image of every part and what is visible in it.
+
+use plainsight_reference::{Draw, Image, fast};
+
+use super::{FrameState, World};
+use crate::oracle::part_draw;
+use crate::part::PartId;
+
+/// What the reference says of one frame.
+pub struct Truth {
+    /// Depth and draw indices of everything.
+    pub image: Image,
+    /// Samples that show each part, by part id.
+    pub visible_pixels: Vec<u32>,
+    /// How many parts show at least one sample.
+    pub visible_parts: u32,
+    /// Hash of the image.
+    pub hash: u64,
+}
+
+impl Truth {
+    /// Renders every part of the frame.
+    #[must_use]
+    pub fn of(world: &World, state: &FrameState) -> Self {
+        let mut image = Image::new(world.scene.viewport);
+        let all: Vec<PartId> = (0..world.partition.part_count()).map(PartId).collect();
+        render(world, state, &all, &mut image);
+        let mut visible_pixels = vec![0_u32; all.len()];
+        for sample in 0..image.samples().len() {
+            if let Some(draw) = image.draw_index(sample) {
+                visible_pixels[world.partition.part_of_draw(draw).0 as usize] += 1;
+            }
+        }
+        let visible_parts = visible_pixels.iter().filter(|&&pixels| pixels > 0).count() as u32;
+        let hash = image.hash();
+        Self { image, visible_pixels, visible_parts, hash }
+    }
+
+    /// The part that a sample shows.
+    #[must_use]
+    pub fn part_at(&self, world: &World, sample: usize) -> Option<PartId> {
+        self.image.draw_index(sample).map(|draw| world.partition.part_of_draw(draw))
+    }
+}
+
+/// Clears `image` and renders `parts` into it.
+pub fn render(world: &World, state: &FrameState, parts: &[PartId], image: &mut Image) {
+    image.clear();
+    let draws: Vec<Draw<'_>> =
+        parts.iter().map(|&part| part_draw(&world.partition, part, &state.matrices)).collect();
+    fast::draw_all(image, &draws);
+}
