@@ -1,0 +1,57 @@
+//! The plain renderer: one loop over triangles, one over the samples of the bounding box, everything
+//! from scratch at every sample. So simple that it is unlikely to be incorrect; what is faster must
+//! equal it bit for bit.
+
+use crate::draw::Draw;
+use crate::image::{Image, Viewport};
+use crate::window::{Oriented, SUBPIXELS, Window, depth, edge, top_left};
+
+/// Draws into `image`.
+pub fn draw(image: &mut Image, draw: &Draw<'_>) {
+    let viewport = image.viewport();
+    fragments(viewport, draw, |sample, depth, id| {
+        let stored = &mut image.samples_mut()[sample];
+        *stored = (*stored).min(u64::from(depth.to_bits()) << 32 | u64::from(id));
+    });
+}
+
+/// How many fragments of `draw` have a depth less than or equal to the stored one; a sample that
+/// several triangles cover counts once for each.
+#[must_use]
+pub fn count(image: &Image, draw: &Draw<'_>) -> u64 {
+    let mut passed = 0;
+    fragments(image.viewport(), draw, |sample, depth, _| {
+        passed += u64::from(depth <= image.depth(sample));
+    });
+    passed
+}
+
+fn fragments(viewport: Viewport, draw: &Draw<'_>, mut emit: impl FnMut(usize, f32, u32)) {
+    assert_eq!(draw.triangles.len(), draw.ranks.len(), "one rank a triangle");
+    let window = Window::new(viewport);
+    for (i, triangle) in draw.triangles.iter().enumerate() {
+        let corners = triangle.map(|vertex| draw.clip_vertex(vertex));
+        let Some(polygon) = window.clipper.clip(corners) else { continue };
+        for Oriented { v, area } in window.fan(&polygon) {
+            let low = |at: [i32; 3]| (i64::from(at.into_iter().min().unwrap_or(0)) / SUBPIXELS - 1).max(0);
+            let high = |at: [i32; 3], side: u32| {
+                (i64::from(at.into_iter().max().unwrap_or(0)) / SUBPIXELS + 1).min(i64::from(side) - 1)
+            };
+            let (xs, ys) = (v.map(|v| v.x), v.map(|v| v.y));
+            for row in low(ys)..=high(ys, viewport.height) {
+                for column in low(xs)..=high(xs, viewport.width) {
+                    let (x, y) = (column * SUBPIXELS + SUBPIXELS / 2, row * SUBPIXELS + SUBPIXELS / 2);
+                    let opposite = |i: usize| (v[(i + 1) % 3], v[(i + 2) % 3]);
+                    let e = [0, 1, 2].map(|i| edge(opposite(i).0, opposite(i).1, x, y));
+                    let inside = |i: usize| {
+                        e[i] > 0 || (e[i] == 0 && top_left(opposite(i).0, opposite(i).1))
+                    };
+                    if (0..3).all(inside) {
+                        let sample = (row * i64::from(viewport.width) + column) as usize;
+                        emit(sample, depth(e, v.map(|v| v.z), area), draw.stored_id(i));
+                    }
+                }
+            }
+        }
+    }
+}
