@@ -1,1 +1,8 @@
-//! Stub.
+//! What people look at: the table of a run, its lines as JSON, and pictures. Reports read traces and
+//! gates; they decide nothing.
+
+mod picture;
+mod row;
+
+pub use picture::{Shown, depth_picture, part_picture, picture_png, top_view};
+pub use row::{JSON_SCHEMA, Row, table};

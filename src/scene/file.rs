@@ -1,1 +1,240 @@
-//! Stub.
+//! The scene file: TOML with a version. Either a generator with its knobs, or inline objects with a
+//! camera path. Unknown keys are refused, so that a misspelt knob does not pass unseen.
+//!
+//! ```toml
+//! version = 1
+//! generator = "city"   # or [[objects]] and [camera_path] below
+//! seed = 7
+//! scale = 0.5
+//! frames = 10
+//! viewport = [640, 480]
+//! ```
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+use serde::Deserialize;
+
+use super::generate::{self, CameraMode, Knobs};
+use super::{
+    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path as Way, Placement, Scene, SceneError,
+    Viewport,
+};
+
+/// The only version there is.
+const VERSION: u32 = 1;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SceneFile {
+    version: u32,
+    generator: Option<String>,
+    name: Option<String>,
+    seed: Option<u64>,
+    scale: Option<f64>,
+    frames: Option<u32>,
+    viewport: Option<[u32; 2]>,
+    mesh: Option<PathBuf>,
+    camera: Option<CameraName>,
+    #[serde(default)]
+    objects: Vec<InlineObject>,
+    camera_path: Option<InlinePath>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum CameraName {
+    Inside,
+    Orbit,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InlineObject {
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    #[serde(default)]
+    translation: [f64; 3],
+    #[serde(default)]
+    rotation_y_degrees: f64,
+    scale: Option<[f64; 3]>,
+    reflect: Option<InlineReflect>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InlineReflect {
+    velocity: [f64; 3],
+    min: [f64; 3],
+    max: [f64; 3],
+    #[serde(default)]
+    spin: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InlinePath {
+    poses: Vec<InlinePose>,
+    fov_y_degrees: f64,
+    near: f64,
+    far: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InlinePose {
+    eye: [f64; 3],
+    target: [f64; 3],
+}
+
+/// Reads the scene of a file; knobs given by the caller win over the file's.
+///
+/// # Errors
+/// [`SceneError::Read`] and [`SceneError::File`] with the line and the remedy, or what the generator
+/// says.
+pub fn load(path: &Path, knobs: &Knobs) -> Result<Scene, SceneError> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
+    let refuse = |what: String| SceneError::File { path: path.to_owned(), what };
+    let file: SceneFile = toml::from_str(&text).map_err(|error| refuse(one_line(&text, &error)))?;
+    if file.version != VERSION {
+        return Err(refuse(format!("version {} is not known; write version = 1", file.version)));
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let camera = file.camera.map(|camera| match camera {
+        CameraName::Inside => CameraMode::Inside,
+        CameraName::Orbit => CameraMode::Orbit,
+    });
+    let viewport = file.viewport.map(|[width, height]| Viewport { width, height });
+    let merged = Knobs {
+        seed: knobs.seed.or(file.seed),
+        scale: knobs.scale.or(file.scale),
+        frames: knobs.frames.or(file.frames),
+        viewport: knobs.viewport.or(viewport),
+        mesh: knobs.mesh.clone().or_else(|| file.mesh.as_ref().map(|mesh| folder.join(mesh))),
+        camera: knobs.camera.or(camera),
+    };
+    match (&file.generator, file.objects.is_empty()) {
+        (Some(generator), true) => generate::build(generator, &merged),
+        (None, false) => inline(file, &merged).map_err(refuse),
+        (Some(_), false) => {
+            Err(refuse("has a generator and objects; keep one of the two".to_owned()))
+        }
+        (None, true) => {
+            Err(refuse("has neither a generator nor [[objects]]; add one".to_owned()))
+        }
+    }
+}
+
+/// The parser's message without its picture, with the line in front.
+fn one_line(text: &str, error: &toml::de::Error) -> String {
+    let message = error.message().replace('\n', " ");
+    match error.span() {
+        Some(span) => {
+            let line = text.as_bytes()[..span.start.min(text.len())].iter().filter(|&&b| b == b'\n');
+            format!("line {}: {message}", line.count() + 1)
+        }
+        None => message,
+    }
+}
+
+fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
+    let chosen = knobs.chosen().map_err(|error| error.to_string())?;
+    let path = file.camera_path.ok_or("inline objects need a [camera_path]")?;
+    let (mut meshes, mut objects, mut movers) = (Vec::new(), Vec::new(), Vec::new());
+    for (number, object) in file.objects.into_iter().enumerate() {
+        let numbers = [object.translation, object.scale.unwrap_or([1.0; 3])];
+        if !(numbers.as_flattened().iter().all(|c| c.is_finite())
+            && object.rotation_y_degrees.is_finite())
+        {
+            return Err(format!("object {number}: its placement must be finite"));
+        }
+        let mesh = Mesh::new(format!("object {number}"), object.positions, object.triangles);
+        meshes.push(Arc::new(mesh.map_err(|error| error.to_string())?));
+        let placement = Placement {
+            translation: object.translation.into(),
+            rotation: DQuat::from_rotation_y(object.rotation_y_degrees.to_radians()),
+            scale: numbers[1].into(),
+        };
+        objects.push(Object { mesh: number as u32, placement });
+        if let Some(InlineReflect { velocity, min, max, spin }) = object.reflect {
+            if !([velocity, min, max].as_flattened().iter().all(|c| c.is_finite()) && spin.is_finite()) {
+                return Err(format!("object {number}: its motion must be finite"));
+            }
+            let way =
+                Way::Reflect { velocity: velocity.into(), min: min.into(), max: max.into(), spin };
+            movers.push((number as u32, way));
+        }
+    }
+    Ok(Scene {
+        name: file.name.unwrap_or_else(|| "inline".to_owned()),
+        seed: chosen.seed,
+        meshes,
+        objects,
+        camera: camera(&path, chosen.frames)?,
+        viewport: chosen.viewport,
+        frames: chosen.frames,
+        effects: Effects { motion: (!movers.is_empty()).then_some(Motion { movers }) },
+    })
+}
+
+fn camera(path: &InlinePath, duration: u32) -> Result<CameraPath, String> {
+    let pose = |pose: &InlinePose| {
+        let (eye, target) = (DVec3::from(pose.eye), DVec3::from(pose.target));
+        let seen = eye.is_finite() && target.is_finite() && eye != target;
+        seen.then_some(CameraPose { eye, target })
+    };
+    let poses: Option<Vec<CameraPose>> = path.poses.iter().map(pose).collect();
+    let poses = poses
+        .filter(|poses| !poses.is_empty())
+        .ok_or("camera_path: needs poses whose eye and target are finite and differ")?;
+    if !(path.fov_y_degrees > 0.0 && path.fov_y_degrees < 180.0) {
+        return Err("camera_path: fov_y_degrees must be above 0 and below 180".to_owned());
+    }
+    if !(path.near > 0.0 && path.far > path.near && path.far.is_finite()) {
+        return Err("camera_path: needs 0 < near < far".to_owned());
+    }
+    let fov_y = path.fov_y_degrees.to_radians();
+    Ok(CameraPath { poses, duration, fov_y, near: path.near, far: path.far })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Scene, String> {
+        let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        load(file.path(), &Knobs::default()).map_err(|error| error.to_string())
+    }
+
+    const INLINE: &str = "version = 1\nframes = 3\n[[objects]]\npositions = [[0,0,0],[1,0,0],[0,1,0]]\n\
+        triangles = [[0,1,2]]\n[camera_path]\nposes = [{ eye = [0,0,5], target = [0,0,0] }]\n\
+        fov_y_degrees = 60\nnear = 0.1\nfar = 10\n";
+
+    #[test]
+    fn generators_and_inline_objects_are_read() {
+        let scene = read("version = 1\ngenerator = \"soup\"\nseed = 5\nscale = 0.01\nframes = 2\n");
+        let scene = scene.unwrap();
+        assert_eq!((scene.name.as_str(), scene.seed, scene.frames), ("soup", 5, 2));
+        assert_eq!(read(INLINE).unwrap().triangle_count(), 1);
+    }
+
+    #[test]
+    fn refusals_are_one_line_and_name_the_place() {
+        for (text, says) in [
+            ("version = 2\n", "version 2 is not known"),
+            ("version = 1\n", "neither a generator nor"),
+            ("version = 1\ngenerater = \"soup\"\n", "line 2: unknown field `generater`"),
+            ("version = 1\nseed = \n", "line 2"),
+            (&INLINE.replace("[0,1,2]", "[0,1,3]"), "names a vertex beyond the 3"),
+            (&INLINE.replace("near = 0.1", "near = 0.0"), "needs 0 < near < far"),
+            (&INLINE.replace("target = [0,0,0]", "target = [0,0,5]"), "finite and differ"),
+            (&INLINE.replace("[1,0,0]", "[nan,0,0]"), "not finite"),
+        ] {
+            let error = read(text).unwrap_err();
+            assert!(error.contains(says) && !error.contains('\n'), "{text:?} said {error}");
+        }
+    }
+}

@@ -1,1 +1,147 @@
-//! Stub.
+//! Import of Wavefront OBJ through `tobj`, behind a scan of our own that names the line of what it
+//! refuses. Only positions and faces are taken; each group or object becomes a mesh, polygons are
+//! fanned into triangles.
+
+use std::path::Path;
+
+use super::{Mesh, SceneError};
+use crate::math::Aabb;
+
+/// Reads the meshes of `path`, in file order; groups without faces are left out.
+///
+/// # Errors
+/// [`SceneError::Read`] where the file cannot be read, [`SceneError::File`] with the line where a
+/// number is no finite f32, a face names a vertex that is not there, or nothing is left to draw.
+pub fn obj(path: &Path) -> Result<Vec<Mesh>, SceneError> {
+    let bytes =
+        std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
+    let refuse = |what: String| SceneError::File { path: path.to_owned(), what };
+    let text = String::from_utf8_lossy(&bytes);
+    scan(&text).map_err(refuse)?;
+    let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
+    // Materials are never wanted; tobj reports their absence beside the models.
+    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials)
+        .map_err(|error| refuse(format!("not an OBJ file that can be read: {error}")))?;
+    let mut meshes = Vec::new();
+    for model in models {
+        let triple = |c: &[f32]| [c[0], c[1], c[2]];
+        let positions = model.mesh.positions.chunks_exact(3).map(triple).collect();
+        let triangles: Vec<[u32; 3]> =
+            model.mesh.indices.chunks_exact(3).map(|i| [i[0], i[1], i[2]]).collect();
+        if !triangles.is_empty() {
+            let mesh = Mesh::new(model.name, positions, triangles);
+            meshes.push(mesh.map_err(|error| refuse(error.to_string()))?);
+        }
+    }
+    if meshes.is_empty() {
+        return Err(refuse("holds no faces; export the model with its polygons".to_owned()));
+    }
+    Ok(meshes)
+}
+
+/// Checks every vertex and face line; `tobj` takes NaN for a number and names no lines.
+fn scan(text: &str) -> Result<(), String> {
+    let mut vertices = 0_i64;
+    for (number, line) in text.lines().enumerate() {
+        let number = number + 1;
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => {
+                let mut coordinates = 0;
+                for word in words.take(3) {
+                    let finite = word.parse::<f32>().is_ok_and(f32::is_finite);
+                    if !finite {
+                        return Err(format!("line {number}: '{}' is no finite number", short(word)));
+                    }
+                    coordinates += 1;
+                }
+                if coordinates < 3 {
+                    return Err(format!("line {number}: a vertex needs three coordinates"));
+                }
+                vertices += 1;
+            }
+            Some("f") => {
+                for word in words {
+                    let index = word.split('/').next().unwrap_or("");
+                    let Ok(index) = index.parse::<i64>() else {
+                        return Err(format!("line {number}: '{}' is no vertex index", short(word)));
+                    };
+                    let place = if index < 0 { vertices + index + 1 } else { index };
+                    if !(1..=vertices).contains(&place) {
+                        return Err(format!(
+                            "line {number}: face names vertex {index}, there are {vertices} so far"
+                        ));
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Enough of a word to know it by.
+fn short(word: &str) -> String {
+    word.chars().take(24).collect()
+}
+
+/// All meshes as one, its box centred at the origin and scaled so that the farthest corner of the box
+/// is `radius` away.
+///
+/// # Errors
+/// [`SceneError::Mesh`] where there are more vertices than an index can name.
+pub fn merged(meshes: &[Mesh], radius: f64) -> Result<Mesh, SceneError> {
+    let bounds = Aabb::of_points(meshes.iter().flat_map(|mesh| mesh.positions()));
+    let half = bounds.size().length() * 0.5;
+    let factor = if half > 0.0 { radius / half } else { 1.0 };
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for mesh in meshes {
+        let first = u32::try_from(positions.len()).map_err(|_| SceneError::Mesh {
+            mesh: mesh.name().to_owned(),
+            what: "has more than 2³² vertices with those before it".to_owned(),
+        })?;
+        let moved = |p: &[f32; 3]| {
+            let p = glam::DVec3::from_array(p.map(f64::from));
+            ((p - bounds.center()) * factor).as_vec3().to_array()
+        };
+        positions.extend(mesh.positions().iter().map(moved));
+        triangles.extend(mesh.triangles().iter().map(|t| t.map(|i| first + i)));
+    }
+    Mesh::new("merged", positions, triangles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn import(text: &str) -> Result<Vec<Mesh>, String> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        obj(file.path()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn groups_become_meshes_and_polygons_triangles() {
+        let meshes = import("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\ng a\nf 1 2 3 4\ng b\nf -1 -2 -3\n");
+        let meshes = meshes.unwrap();
+        let counts: Vec<usize> = meshes.iter().map(|m| m.triangles().len()).collect();
+        assert_eq!(counts, [2, 1]);
+    }
+
+    #[test]
+    fn refusals_name_the_line() {
+        for (text, says) in [
+            ("", "holds no faces"),
+            ("v 0 0 0\nv nan 0 0\n", "line 2: 'nan' is no finite number"),
+            ("v 0 0 1e39\n", "line 1: '1e39' is no finite number"),
+            ("v 0 0\n", "line 1: a vertex needs three coordinates"),
+            ("v 0 0 0\nf 1 1 2\n", "line 2: face names vertex 2, there are 1 so far"),
+            ("v 0 0 0\nf 1 1 0\n", "line 2: face names vertex 0"),
+            ("v 0 0 0\nf 1 x 1\n", "line 2: 'x' is no vertex index"),
+        ] {
+            let error = import(text).unwrap_err();
+            assert!(error.contains(says), "{text:?} said {error}");
+        }
+    }
+}

@@ -1,1 +1,185 @@
-//! Stub.
+//! Seeded scenes, one generator per file; a new one is a file and a line in [`GENERATORS`].
+
+mod bunnies;
+mod city;
+mod model;
+mod rooms;
+mod shape;
+mod soup;
+
+use std::path::PathBuf;
+
+use super::{Scene, SceneError, Viewport, file};
+
+pub use shape::blob;
+
+/// What a user may choose; `None` leaves it to the generator or the scene file.
+#[derive(Clone, Debug, Default)]
+pub struct Knobs {
+    /// Seed of every stream; 1 by default.
+    pub seed: Option<u64>,
+    /// Size of the scene, 1 by default; see each generator for what grows. In (0, 1000].
+    pub scale: Option<f64>,
+    /// Frames of a run, at least 1; 24 by default.
+    pub frames: Option<u32>,
+    /// Pixels; 1280 × 1024 by default.
+    pub viewport: Option<Viewport>,
+    /// A model in the place of the generated shape.
+    pub mesh: Option<PathBuf>,
+    /// Where the camera of an imported model goes.
+    pub camera: Option<CameraMode>,
+}
+
+/// Where the camera of an imported model goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CameraMode {
+    /// Through its middle at eye height.
+    Inside,
+    /// Round it.
+    Orbit,
+}
+
+/// Knobs with defaults in place, checked.
+pub(super) struct Chosen {
+    pub(super) seed: u64,
+    pub(super) scale: f64,
+    pub(super) frames: u32,
+    pub(super) viewport: Viewport,
+    pub(super) mesh: Option<PathBuf>,
+    pub(super) camera: CameraMode,
+}
+
+impl Knobs {
+    pub(super) fn chosen(&self) -> Result<Chosen, SceneError> {
+        let refuse = |knob, range, got: String| Err(SceneError::Knob { knob, range, got });
+        let scale = self.scale.unwrap_or(1.0);
+        if !(scale > 0.0 && scale <= 1000.0) {
+            return refuse("--scale", "above 0 and at most 1000", scale.to_string());
+        }
+        let frames = self.frames.unwrap_or(24);
+        if !(1..=1_000_000).contains(&frames) {
+            return refuse("--frames", "from 1 to 1000000", frames.to_string());
+        }
+        let viewport = self.viewport.unwrap_or(Viewport { width: 1280, height: 1024 });
+        let legal = 1..=Viewport::MAX_SIDE;
+        if !(legal.contains(&viewport.width) && legal.contains(&viewport.height)) {
+            let got = format!("{}x{}", viewport.width, viewport.height);
+            return refuse("--viewport", "1 to 16384 pixels on each side", got);
+        }
+        Ok(Chosen {
+            seed: self.seed.unwrap_or(1),
+            scale,
+            frames,
+            viewport,
+            mesh: self.mesh.clone(),
+            camera: self.camera.unwrap_or(CameraMode::Orbit),
+        })
+    }
+}
+
+/// A member of the family.
+#[derive(Clone, Copy)]
+pub struct Generator {
+    /// Name for flags, files and reports.
+    pub name: &'static str,
+    /// One line for `list`.
+    pub summary: &'static str,
+    build: fn(&Chosen) -> Result<Scene, SceneError>,
+}
+
+/// Every generator there is.
+pub const GENERATORS: &[Generator] = &[
+    Generator {
+        name: "bunnies",
+        summary: "moving bumpy blobs packed densely in a box, freely interpenetrating",
+        build: bunnies::build,
+    },
+    Generator {
+        name: "city",
+        summary: "blocks and streets with moving cars, the camera at street level",
+        build: city::build,
+    },
+    Generator {
+        name: "rooms",
+        summary: "a floor of furnished rooms with doorways, the camera walking through",
+        build: rooms::build,
+    },
+    Generator {
+        name: "soup",
+        summary: "random triangles and boxes of wild sizes, for property tests",
+        build: soup::build,
+    },
+    Generator {
+        name: "model",
+        summary: "an imported OBJ model (--mesh), each of its groups an object",
+        build: model::build,
+    },
+];
+
+/// Builds the scene called `name`.
+///
+/// # Errors
+/// [`SceneError::Unknown`] for a name that is not in [`GENERATORS`], [`SceneError::Knob`] for a knob
+/// out of range, and what the import says where a model is asked for.
+pub fn build(name: &str, knobs: &Knobs) -> Result<Scene, SceneError> {
+    let Some(generator) = GENERATORS.iter().find(|g| g.name == name) else {
+        let names: Vec<&str> = GENERATORS.iter().map(|g| g.name).collect();
+        return Err(SceneError::Unknown { name: name.to_owned(), known: names.join(", ") });
+    };
+    (generator.build)(&knobs.chosen()?)
+}
+
+/// A generator's scene or, for a name that ends in `.toml`, that file's; knobs given here win over
+/// the file's.
+///
+/// # Errors
+/// As [`build`] and [`file::load`].
+pub fn open(name_or_file: &str, knobs: &Knobs) -> Result<Scene, SceneError> {
+    if name_or_file.to_ascii_lowercase().ends_with(".toml") {
+        file::load(name_or_file.as_ref(), knobs)
+    } else {
+        build(name_or_file, knobs)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn small(name: &str, seed: u64) -> Scene {
+        build(name, &Knobs { seed: Some(seed), scale: Some(0.01), ..Knobs::default() }).unwrap()
+    }
+
+    #[test]
+    fn same_seed_same_scene() {
+        for generator in GENERATORS.iter().filter(|g| g.name != "model") {
+            let (a, b) = (small(generator.name, 7), small(generator.name, 7));
+            assert_eq!(format!("{a:?}"), format!("{b:?}"), "{}", generator.name);
+            assert_ne!(format!("{a:?}"), format!("{:?}", small(generator.name, 8)));
+            assert!(a.triangle_count() > 0 && a.triangle_count() < 200_000, "{}", generator.name);
+        }
+    }
+
+    #[test]
+    fn full_size_has_a_million_triangles() {
+        for generator in GENERATORS.iter().filter(|g| g.name != "model") {
+            let scene = build(generator.name, &Knobs::default()).unwrap();
+            let triangles = scene.triangle_count();
+            assert!(triangles >= 1_000_000, "{} has {triangles}", generator.name);
+        }
+    }
+
+    #[test]
+    fn knobs_out_of_range_are_refused() {
+        let refused = |knobs: Knobs| {
+            matches!(build("soup", &knobs), Err(SceneError::Knob { .. }))
+        };
+        assert!(refused(Knobs { frames: Some(0), ..Knobs::default() }));
+        assert!(refused(Knobs { scale: Some(f64::NAN), ..Knobs::default() }));
+        assert!(refused(Knobs { scale: Some(0.0), ..Knobs::default() }));
+        let viewport = Some(Viewport { width: 0, height: 1 });
+        assert!(refused(Knobs { viewport, ..Knobs::default() }));
+        assert!(matches!(build("nowhere", &Knobs::default()), Err(SceneError::Unknown { .. })));
+        assert!(matches!(build("model", &Knobs::default()), Err(SceneError::Knob { .. })));
+    }
+}

@@ -1,0 +1,156 @@
+//! Pictures of a frame: depth and part colours of an image, and the scene from above with the frustum
+//! and what was drawn, visible and culled, drawn by tiny-skia.
+
+use glam::{DVec2, DVec3};
+use image::{ImageEncoder, RgbImage};
+use plainsight_reference::Image;
+use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, Rect, Stroke, Transform};
+
+use crate::part::{ObjectId, PartId};
+use crate::run::{FrameState, Truth, World};
+
+/// Pixels from the edge of the top view to what it shows.
+const MARGIN: f32 = 16.0;
+/// Colours of the top view: drawn and visible, drawn in vain, culled, missed.
+const FATES: [[u8; 3]; 4] = [[46, 160, 67], [227, 160, 8], [150, 158, 168], [218, 30, 40]];
+
+/// What a culler drew, for the top view.
+pub struct Shown<'a> {
+    /// Parts drawn.
+    pub drawn: &'a [PartId],
+    /// The truth.
+    pub truth: &'a Truth,
+}
+
+/// Depth as grey: near is light, nothing is black. Depth crowds near 1, so the fourth root of the
+/// distance from the far plane is shown, stretched over what the image holds.
+#[must_use]
+pub fn depth_picture(image: &Image) -> RgbImage {
+    let shade = |depth: f32| libm::sqrt(libm::sqrt(1.0 - f64::from(depth)));
+    let drawn = || image.depths().filter(|&depth| depth < 1.0).map(shade);
+    let (low, high) = drawn().fold((f64::INFINITY, 0.0_f64), |(l, h), s| (l.min(s), h.max(s)));
+    let span = if high > low { high - low } else { 1.0 };
+    paint(image, |sample| {
+        let depth = image.depth(sample);
+        if depth >= 1.0 {
+            return [0; 3];
+        }
+        [(40.0 + 215.0 * (shade(depth) - low) / span) as u8; 3]
+    })
+}
+
+/// Each part in a colour of its own; nothing is black.
+#[must_use]
+pub fn part_picture(world: &World, image: &Image) -> RgbImage {
+    paint(image, |sample| {
+        image.draw_index(sample).map_or([0; 3], |draw| {
+            // Knuth's multiplicative hash spreads neighbouring ids over the colours.
+            let hash = (world.partition.part_of_draw(draw).0 + 1).wrapping_mul(2_654_435_761);
+            [24, 16, 8].map(|shift| 55 + ((hash >> shift) as u8 as f32 * 0.78) as u8)
+        })
+    })
+}
+
+fn paint(image: &Image, color: impl Fn(usize) -> [u8; 3]) -> RgbImage {
+    let viewport = image.viewport();
+    let bytes = (0..image.samples().len()).flat_map(color).collect();
+    RgbImage::from_raw(viewport.width, viewport.height, bytes).expect("three bytes a sample")
+}
+
+/// The scene from above (x to the right, z down): boxes of objects by their fate, the camera and its
+/// frustum. Green: drawn and visible; amber: drawn, not visible; grey: culled; red: visible and not
+/// drawn. Objects in one column of space are painted over each other, missed ones last.
+#[must_use]
+pub fn top_view(world: &World, state: &FrameState, shown: &Shown<'_>, side: u32) -> RgbImage {
+    let mut pixmap = Pixmap::new(side.max(64), side.max(64)).expect("a picture has pixels");
+    pixmap.fill(Color::WHITE);
+    let mut low = DVec2::new(state.camera.eye.x, state.camera.eye.z);
+    let mut high = low;
+    for object in state.objects.iter().filter(|o| !o.bounds.is_empty()) {
+        low = low.min(DVec2::new(object.bounds.min.x, object.bounds.min.z));
+        high = high.max(DVec2::new(object.bounds.max.x, object.bounds.max.z));
+    }
+    let reach = (high - low).max_element().max(1e-9);
+    let scale = f64::from(side.max(64) as f32 - 2.0 * MARGIN) / reach;
+    let place = |p: DVec3| {
+        let at = (DVec2::new(p.x, p.z) - low) * scale;
+        (at.x as f32 + MARGIN, at.y as f32 + MARGIN)
+    };
+    let mut boxes: Vec<(usize, u32)> =
+        (0..state.objects.len() as u32).map(|o| (fate(world, shown, o), o)).collect();
+    boxes.sort_by_key(|&(fate, object)| ([2, 1, 0, 3].iter().position(|&f| f == fate), object));
+    for (fate, object) in boxes {
+        let bounds = state.objects[object as usize].bounds;
+        if bounds.is_empty() {
+            continue;
+        }
+        let ((x0, y0), (x1, y1)) = (place(bounds.min), place(bounds.max));
+        let Some(rect) = Rect::from_ltrb(x0, y0, x1.max(x0 + 1.0), y1.max(y0 + 1.0)) else { continue };
+        let [r, g, b] = FATES[fate];
+        let mut paint = Paint::default();
+        paint.set_color_rgba8(r, g, b, 90);
+        pixmap.fill_rect(rect, &paint, Transform::identity(), None);
+        paint.set_color_rgba8(r, g, b, 255);
+        let path = PathBuilder::from_rect(rect);
+        pixmap.stroke_path(&path, &paint, &Stroke::default(), Transform::identity(), None);
+    }
+    frustum(&mut pixmap, world, state, reach, &place);
+    let rgb = pixmap.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
+    RgbImage::from_raw(pixmap.width(), pixmap.height(), rgb).expect("three bytes a pixel")
+}
+
+/// Which of [`FATES`] an object has: the worst of its parts'.
+fn fate(world: &World, shown: &Shown<'_>, object: u32) -> usize {
+    let visible = |part: PartId| shown.truth.visible_pixels[part.0 as usize] > 0;
+    let mut seen = [false; 4];
+    for part in world.partition.parts_of(ObjectId(object)) {
+        seen[match (shown.drawn.contains(&part), visible(part)) {
+            (true, true) => 0,
+            (true, false) => 1,
+            (false, false) => 2,
+            (false, true) => 3,
+        }] = true;
+    }
+    [3, 0, 1, 2].into_iter().find(|&fate| seen[fate]).unwrap_or(2)
+}
+
+fn frustum(
+    pixmap: &mut Pixmap,
+    world: &World,
+    state: &FrameState,
+    reach: f64,
+    place: &dyn Fn(DVec3) -> (f32, f32),
+) {
+    let camera = state.camera;
+    let viewport = world.scene.viewport;
+    let half = crate::math::tan(camera.fov_y * 0.5) * f64::from(viewport.width)
+        / f64::from(viewport.height);
+    let right = camera.forward.cross(DVec3::Y).normalize_or_zero() * half;
+    let far = reach * 1.5;
+    let mut path = PathBuilder::new();
+    let (ex, ey) = place(camera.eye);
+    for side in [-1.0, 1.0] {
+        let (x, y) = place(camera.eye + (camera.forward + right * side) * far);
+        path.move_to(ex, ey);
+        path.line_to(x, y);
+    }
+    path.push_circle(ex, ey, 5.0);
+    let Some(path) = path.finish() else { return };
+    let mut paint = Paint::default();
+    paint.set_color_rgba8(30, 60, 200, 255);
+    let stroke = Stroke { width: 2.0, ..Stroke::default() };
+    pixmap.stroke_path(&path, &paint, &stroke, Transform::identity(), None);
+    if let Some(dot) = PathBuilder::from_circle(ex, ey, 4.0) {
+        pixmap.fill_path(&dot, &paint, FillRule::Winding, Transform::identity(), None);
+    }
+}
+
+/// The picture as a PNG file's bytes.
+#[must_use]
+pub fn picture_png(picture: &RgbImage) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    image::codecs::png::PngEncoder::new(&mut bytes)
+        .write_image(picture, picture.width(), picture.height(), image::ExtendedColorType::Rgb8)
+        .expect("writing to memory does not fail");
+    bytes
+}
