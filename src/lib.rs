@@ -19,11 +19,13 @@
 //! | [`run`] | scene + culler + oracle to a trace, observed frame by frame | the checks |
 //! | [`check`] | observers of a run, one property per file | reports |
 //! | [`report`] | tables and pictures | |
+//! | [`cli`] | verbs; wires checks to runs | |
 //!
 //! A frame is a pure function of (scene, t). Nothing that is compared sees a clock, a hash order, an
 //! address or the timing of a thread.
 
 pub mod check;
+pub mod cli;
 pub mod cull;
 pub mod effect;
 pub mod index;

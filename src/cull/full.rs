@@ -23,7 +23,7 @@ use crate::oracle::{OracleError, QueryId};
 
 /// Frames to wait before the next question, by the number of "visible" answers in a row (section 3.4:
 /// the higher the number, the longer the wait). Beyond the end, the last entry.
-pub const POSTPONEMENT: [u32; 6] = [0, 1, 2, 4, 6, 8];
+const POSTPONEMENT: [u32; 6] = [0, 1, 2, 4, 6, 8];
 
 /// What can be tuned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

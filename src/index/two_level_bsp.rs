@@ -19,7 +19,7 @@ use crate::math::Aabb;
 use crate::part::ObjectId;
 
 /// A node with no more objects than this is not parted any further.
-pub const LEAF_OBJECTS: usize = 2;
+const LEAF_OBJECTS: usize = 2;
 /// A straddling object is looked at whenever its node is, so it weighs as much as this many objects
 /// out of balance when planes are compared.
 const STRADDLE_WEIGHT: usize = 3;

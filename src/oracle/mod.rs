@@ -10,7 +10,7 @@
 
 mod always;
 mod sim;
-#[cfg(feature = "hardware")]
+#[cfg_attr(not(feature = "hardware"), path = "no_wgpu.rs")]
 pub mod wgpu;
 
 use std::sync::Arc;

@@ -177,16 +177,29 @@ impl Partition {
         (ObjectId(object as u32), part.0 - self.first_part[object])
     }
 
+    fn locate_draw(&self, draw: u32) -> (ObjectId, u32) {
+        assert!(draw < self.fragment_count(), "draw {draw} of {}", self.fragment_count());
+        let object = self.first_draw.partition_point(|&first| first <= draw) - 1;
+        (ObjectId(object as u32), draw - self.first_draw[object])
+    }
+
     /// The part that holds the fragment with this draw index.
     ///
     /// # Panics
     /// For an index beyond the last fragment.
     #[must_use]
     pub fn part_of_draw(&self, draw: u32) -> PartId {
-        assert!(draw < self.fragment_count(), "draw {draw} of {}", self.fragment_count());
-        let object = self.first_draw.partition_point(|&first| first <= draw) - 1;
-        let mesh = self.mesh(ObjectId(object as u32));
-        let local = mesh.part_of_rank[(draw - self.first_draw[object]) as usize];
-        PartId(self.first_part[object] + local)
+        let (object, rank) = self.locate_draw(draw);
+        PartId(self.first_part(object).0 + self.mesh(object).part_of_rank[rank as usize])
+    }
+
+    /// The object and source triangle of the fragment with this draw index.
+    ///
+    /// # Panics
+    /// For an index beyond the last fragment.
+    #[must_use]
+    pub fn source_of_draw(&self, draw: u32) -> (ObjectId, u32) {
+        let (object, rank) = self.locate_draw(draw);
+        (object, self.mesh(object).source_of_rank[rank as usize])
     }
 }

@@ -4,7 +4,7 @@ use plainsight_reference::{Draw, Image, fast};
 
 use super::{FrameState, World};
 use crate::oracle::part_draw;
-use crate::part::PartId;
+use crate::part::{PartId, PartitionKnobs};
 
 /// What the reference says of one frame.
 pub struct Truth {
@@ -49,4 +49,19 @@ pub fn render(world: &World, state: &FrameState, parts: &[PartId], image: &mut I
     let draws: Vec<Draw<'_>> =
         parts.iter().map(|&part| part_draw(&world.partition, part, &state.matrices)).collect();
     fast::draw_all(image, &draws);
+}
+
+/// Samples of frame 0 at which the cut scene shows another object or source triangle than the uncut
+/// one: what the T-junctions along the cuts cost.
+#[must_use]
+pub fn partition_difference(world: &World) -> u64 {
+    let uncut =
+        World::new((*world.scene).clone(), PartitionKnobs { leaf_triangles: u32::MAX });
+    let sources = |world: &World| {
+        let truth = Truth::of(world, &FrameState::at(world, 0));
+        (0..truth.image.samples().len())
+            .map(|sample| truth.image.draw_index(sample).map(|d| world.partition.source_of_draw(d)))
+            .collect::<Vec<_>>()
+    };
+    sources(world).iter().zip(sources(&uncut)).filter(|(cut, whole)| **cut != *whole).count() as u64
 }

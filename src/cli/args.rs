@@ -1,0 +1,240 @@
+//! The arguments of every verb.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::cull::ProxyKind;
+use crate::part::PartitionKnobs;
+use crate::scene::Viewport;
+use crate::scene::generate::{CameraMode, Knobs};
+
+/// A test bench for visibility culling: nothing in plain sight may be culled.
+#[derive(Parser)]
+#[command(name = "plainsight", version, about, after_help = "Exit codes: 0 all held, 1 a check \
+failed, 2 bad usage or input, 3 a device was lost or missing where one was required.")]
+pub(super) struct Cli {
+    #[command(subcommand)]
+    pub(super) verb: Option<Verb>,
+}
+
+#[derive(Subcommand)]
+pub(super) enum Verb {
+    /// Run cullers beside the truth and judge every frame (the default).
+    Run(RunArgs),
+    /// Run one lane again, frame by frame; what a failure's last line calls.
+    Replay(ReplayArgs),
+    /// Draw a frame: the truth, the culled image and the view from above, as PNG.
+    Picture(PictureArgs),
+    /// List scenes, cullers, oracles, indexes and devices.
+    List,
+}
+
+/// `run` without arguments, for the default verb.
+#[derive(Parser)]
+struct BareRun {
+    #[command(flatten)]
+    args: RunArgs,
+}
+
+impl Default for Verb {
+    fn default() -> Self {
+        Self::Run(BareRun::parse_from(["plainsight"]).args)
+    }
+}
+
+/// What is run, shared by all verbs that run something.
+#[derive(Args, Clone)]
+pub(super) struct SceneArgs {
+    /// Seed of every random stream (default 1, or the scene file's).
+    #[arg(long)]
+    pub(super) seed: Option<u64>,
+    /// Frames to run (default 24, or the scene file's).
+    #[arg(long)]
+    pub(super) frames: Option<u32>,
+    /// Size of generated scenes: 1 is a million triangles and more.
+    #[arg(long)]
+    pub(super) scale: Option<f64>,
+    /// Pixels, WIDTHxHEIGHT (default 1280x1024).
+    #[arg(long, value_parser = viewport)]
+    pub(super) viewport: Option<Viewport>,
+    /// An OBJ model: in the place of the blob in bunnies, or the scene `model` itself.
+    #[arg(long, value_name = "FILE.obj")]
+    pub(super) mesh: Option<PathBuf>,
+    /// Where the camera of the scene `model` goes.
+    #[arg(long, value_enum)]
+    pub(super) camera: Option<CameraArg>,
+    /// Most triangles in a part.
+    #[arg(long, default_value_t = PartitionKnobs::default().leaf_triangles,
+        value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) leaf: u32,
+    /// Which spatial index over the objects.
+    #[arg(long, default_value = "two-level-bsp")]
+    pub(super) index: String,
+    /// What is asked about in the place of geometry.
+    #[arg(long, value_enum, default_value_t = ProxyArg::Rectangle)]
+    pub(super) proxy: ProxyArg,
+    /// Part of the name of the Vulkan adapter to use (default: a CPU adapter such as lavapipe).
+    #[arg(long)]
+    pub(super) adapter: Option<String>,
+}
+
+#[derive(Args, Clone)]
+pub(super) struct RunArgs {
+    /// Scenes by name, or scene files (default: bunnies city rooms soup).
+    #[arg(long, value_name = "NAME|FILE.toml", num_args = 1.., value_delimiter = ',')]
+    pub(super) scene: Vec<String>,
+    /// Cullers (default: full simple vfc).
+    #[arg(long, num_args = 1.., value_delimiter = ',')]
+    pub(super) culler: Vec<String>,
+    /// Oracles: sim, hardware, always (default: sim, and hardware where a Vulkan device is found).
+    #[arg(long, num_args = 1.., value_delimiter = ',')]
+    pub(super) oracle: Vec<String>,
+    #[command(flatten)]
+    pub(super) scene_args: SceneArgs,
+    /// One JSON object a line on standard output in place of the table.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Also write the JSON lines to this file.
+    #[arg(long, value_name = "FILE")]
+    pub(super) out: Option<PathBuf>,
+}
+
+#[derive(Args, Clone)]
+pub(super) struct ReplayArgs {
+    /// The scene, by name or file.
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    pub(super) scene: String,
+    /// The culler.
+    #[arg(long, default_value = "full")]
+    pub(super) culler: String,
+    /// The oracle.
+    #[arg(long, default_value = "sim")]
+    pub(super) oracle: String,
+    #[command(flatten)]
+    pub(super) scene_args: SceneArgs,
+    /// The trace hash that must come out.
+    #[arg(long, value_name = "HASH")]
+    pub(super) expect: Option<String>,
+    /// One JSON object a frame in place of the table.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+#[derive(Args, Clone)]
+pub(super) struct PictureArgs {
+    /// The scene, by name or file.
+    #[arg(long, default_value = "bunnies", value_name = "NAME|FILE.toml")]
+    pub(super) scene: String,
+    /// The culler.
+    #[arg(long, default_value = "full")]
+    pub(super) culler: String,
+    /// The oracle: sim or hardware.
+    #[arg(long, default_value = "sim")]
+    pub(super) oracle: String,
+    #[command(flatten)]
+    pub(super) scene_args: SceneArgs,
+    /// Which frame, from 0; the frames before it are run too.
+    #[arg(long, default_value_t = 0)]
+    pub(super) frame: u32,
+    /// What to draw.
+    #[arg(long, value_enum, default_value_t = Layer::Parts)]
+    pub(super) layer: Layer,
+    /// The PNG file (default: SCENE-FRAME-LAYER.png).
+    #[arg(long, value_name = "FILE.png")]
+    pub(super) out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Layer {
+    /// The truth, each part in a colour of its own.
+    Parts,
+    /// The truth's depth, near is light.
+    Depth,
+    /// The reference's image of what the culler drew.
+    Culled,
+    /// From above: frustum; green drawn and visible, amber drawn in vain, grey culled, red missed.
+    Top,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum CameraArg {
+    /// Through its middle at eye height.
+    Inside,
+    /// Round it.
+    Orbit,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ProxyArg {
+    /// The projected corners' rectangle at the nearest depth.
+    Rectangle,
+    /// The inflated box with interpolated depth.
+    Box,
+}
+
+impl From<ProxyArg> for ProxyKind {
+    fn from(proxy: ProxyArg) -> Self {
+        match proxy {
+            ProxyArg::Rectangle => Self::Rectangle,
+            ProxyArg::Box => Self::Box,
+        }
+    }
+}
+
+fn viewport(text: &str) -> Result<Viewport, String> {
+    let sides = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    let legal = |side: &u32| (1..=Viewport::MAX_SIDE).contains(side);
+    match sides {
+        Some((width, height)) if legal(&width) && legal(&height) => Ok(Viewport { width, height }),
+        _ => Err("write WIDTHxHEIGHT, each from 1 to 16384, as in 1280x1024".to_owned()),
+    }
+}
+
+impl SceneArgs {
+    /// As the generators take them.
+    pub(super) fn knobs(&self) -> Knobs {
+        Knobs {
+            seed: self.seed,
+            scale: self.scale,
+            frames: self.frames,
+            viewport: self.viewport,
+            mesh: self.mesh.clone(),
+            camera: self.camera.map(|camera| match camera {
+                CameraArg::Inside => CameraMode::Inside,
+                CameraArg::Orbit => CameraMode::Orbit,
+            }),
+        }
+    }
+
+    /// The flags that lead here again, each preceded by a space; defaults are left out.
+    pub(super) fn replay_flags(&self) -> String {
+        let mut flags = String::new();
+        let mut add = |name: &str, value: Option<String>| {
+            if let Some(value) = value {
+                flags += &format!(" --{name} {}", quoted(&value));
+            }
+        };
+        add("scale", self.scale.map(|s| s.to_string()));
+        add("viewport", self.viewport.map(|v| format!("{}x{}", v.width, v.height)));
+        add("mesh", self.mesh.as_ref().map(|path| path.display().to_string()));
+        let camera = |c: CameraArg| if c == CameraArg::Inside { "inside" } else { "orbit" };
+        add("camera", self.camera.map(|c| camera(c).to_owned()));
+        let leaf = (self.leaf != PartitionKnobs::default().leaf_triangles).then_some(self.leaf);
+        add("leaf", leaf.map(|leaf| leaf.to_string()));
+        add("index", (self.index != "two-level-bsp").then(|| self.index.clone()));
+        add("proxy", (self.proxy == ProxyArg::Box).then(|| "box".to_owned()));
+        add("adapter", self.adapter.clone());
+        flags
+    }
+}
+
+/// A word as a POSIX shell takes it back.
+pub(super) fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-/+:,=".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}

@@ -1,0 +1,32 @@
+//! `list`: what there is to name.
+
+use super::{CliError, EXIT_HELD, Streams};
+use crate::cull::CullerKind;
+use crate::index::INDEXES;
+use crate::oracle::wgpu::{Gpu, NO_DEVICE};
+use crate::scene::generate::GENERATORS;
+
+pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<u8, CliError> {
+    let out = &mut streams.out;
+    let mut section = |title: &str, lines: Vec<(String, String)>| -> std::io::Result<()> {
+        writeln!(out, "{title}")?;
+        lines.iter().try_for_each(|(name, summary)| writeln!(out, "  {name:<14} {summary}"))
+    };
+    let pair = |name: &str, summary: &str| (name.to_owned(), summary.to_owned());
+    section("scenes", GENERATORS.iter().map(|g| pair(g.name, g.summary)).collect())?;
+    section("cullers", cullers.iter().map(|c| pair(c.name, c.summary)).collect())?;
+    let oracles = [
+        ("sim", "the reference z-buffer, exact and at once"),
+        ("hardware", "occlusion queries of a Vulkan device through wgpu"),
+        ("always", "everything is visible"),
+    ];
+    section("oracles", oracles.iter().map(|&(name, summary)| pair(name, summary)).collect())?;
+    section("indexes", INDEXES.iter().map(|i| pair(i.name, i.summary)).collect())?;
+    section("devices", devices().into_iter().map(|name| (name, String::new())).collect())?;
+    Ok(EXIT_HELD)
+}
+
+fn devices() -> Vec<String> {
+    let adapters = Gpu::adapters();
+    if adapters.is_empty() { vec![NO_DEVICE.to_owned()] } else { adapters }
+}

@@ -1,0 +1,73 @@
+//! `picture`: one frame as PNG.
+
+use std::path::PathBuf;
+
+use plainsight_reference::Image;
+
+use super::args::{Layer, PictureArgs};
+use super::run::{Oracles, Plan, catch_interrupt, pick_cullers, pick_index, progress_bar};
+use super::{CliError, EXIT_HELD, OutFile, Streams};
+use crate::cull::CullerKind;
+use crate::part::PartId;
+use crate::report::{Shown, depth_picture, part_picture, picture_png, top_view};
+use crate::run::{FrameState, Truth, render};
+
+/// Pixels along a side of the view from above.
+const TOP_VIEW_SIDE: u32 = 1024;
+
+pub(super) fn picture(
+    args: &PictureArgs,
+    cullers: &[CullerKind],
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
+    let layer = match args.layer {
+        Layer::Parts => "parts",
+        Layer::Depth => "depth",
+        Layer::Culled => "culled",
+        Layer::Top => "top",
+    };
+    let stem = PathBuf::from(&args.scene);
+    let stem = stem.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let path = args.out.clone().unwrap_or_else(|| format!("{stem}-{}-{layer}.png", args.frame).into());
+    let out = OutFile::create(&path)?;
+    let mut scene_args = args.scene_args.clone();
+    // A culler's history reaches back, so the frames before are run as well; the truth needs none.
+    let needs_culler = matches!(args.layer, Layer::Culled | Layer::Top);
+    if scene_args.frames.is_none_or(|frames| frames <= args.frame) {
+        scene_args.frames = Some(args.frame.saturating_add(1).max(24));
+    }
+    let adapter = args.scene_args.adapter.as_deref();
+    let plan = Plan {
+        cullers: pick_cullers(std::slice::from_ref(&args.culler), cullers)?,
+        index: pick_index(&args.scene_args.index)?,
+        oracles: Oracles::open(std::slice::from_ref(&args.oracle), adapter, streams)?,
+        args: &scene_args,
+    };
+    catch_interrupt();
+    let world = super::run::open_world(&args.scene, &scene_args)?;
+    let state = FrameState::at(&world, args.frame);
+    let truth = Truth::of(&world, &state);
+    let drawn: Vec<PartId> = if needs_culler {
+        let bar = progress_bar();
+        let drawn = plan.drawn_in(&world, args.frame, &bar);
+        bar.finish_and_clear();
+        drawn?
+    } else {
+        Vec::new()
+    };
+    let picture = match args.layer {
+        Layer::Parts => part_picture(&world, &truth.image),
+        Layer::Depth => depth_picture(&truth.image),
+        Layer::Culled => {
+            let mut image = Image::new(world.scene.viewport);
+            render(&world, &state, &drawn, &mut image);
+            part_picture(&world, &image)
+        }
+        Layer::Top => {
+            top_view(&world, &state, &Shown { drawn: &drawn, truth: &truth }, TOP_VIEW_SIDE)
+        }
+    };
+    out.finish(&picture_png(&picture))?;
+    writeln!(streams.out, "{}", path.display())?;
+    Ok(EXIT_HELD)
+}

@@ -1,0 +1,405 @@
+//! `run` and `replay`: scenes × cullers × oracles, side by side under one truth.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde_json::json;
+
+use super::args::{ReplayArgs, RunArgs, SceneArgs, quoted};
+use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use crate::check::Gate;
+use crate::cull::{Culler, CullerKind, CullerSetup};
+use crate::index::{Entry, INDEXES, IndexKind};
+use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
+use crate::oracle::{Always, Oracle, OracleError, Sim, Stage};
+use crate::part::{PartId, PartitionKnobs};
+use crate::report::{Row, table};
+use crate::run::{FrameRecord, Lane, LaneInfo, Observer, Trace, World, partition_difference, run as run_lanes};
+use crate::scene::generate;
+
+/// Frames that are run a second time to see that they repeat.
+const REPEATED_FRAMES: u32 = 2;
+/// The scenes of the default run.
+const DEFAULT_SCENES: [&str; 4] = ["bunnies", "city", "rooms", "soup"];
+/// How many of the cullers the default run takes.
+const DEFAULT_CULLERS: usize = 3;
+
+/// Set by Ctrl-C; a run looks at it after every frame of every lane.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// The oracles of one invocation; the device is opened once.
+pub(super) struct Oracles {
+    names: Vec<String>,
+    gpu: Option<Arc<Gpu>>,
+}
+
+impl Oracles {
+    /// Opens what the names need. Without names: `sim`, and `hardware` where there is a device.
+    pub(super) fn open(
+        names: &[String],
+        adapter: Option<&str>,
+        streams: &mut Streams<'_>,
+    ) -> Result<Self, CliError> {
+        for name in names {
+            if !["sim", "hardware", "always"].contains(&name.as_str()) {
+                let what = format!("no oracle is called '{name}'; there are sim, hardware, always");
+                return Err(CliError::Usage(what));
+            }
+        }
+        let wanted = names.is_empty() || names.iter().any(|name| name == "hardware");
+        let found = if wanted { Gpu::open(adapter) } else { Err(OracleError::NoDevice(String::new())) };
+        let asked_for = !names.is_empty() || adapter.is_some();
+        let mut names = if names.is_empty() {
+            vec!["sim".to_owned(), "hardware".to_owned()]
+        } else {
+            names.to_vec()
+        };
+        match found {
+            Ok(gpu) => Ok(Self { names, gpu: Some(gpu) }),
+            Err(error) if wanted && asked_for => Err(error.into()),
+            Err(error) => {
+                if wanted {
+                    writeln!(streams.talk, "WARNING: {error}")?;
+                    writeln!(streams.talk, "WARNING: no hardware queries are judged; the simulated device runs alone")?;
+                }
+                names.retain(|name| name != "hardware");
+                Ok(Self { names, gpu: None })
+            }
+        }
+    }
+
+    /// One oracle a name for `stage`, made anew for each lane; the geometry on the device is shared.
+    fn stage(&self, stage: &Stage) -> Result<StagedOracles<'_>, OracleError> {
+        Ok(StagedOracles {
+            names: &self.names,
+            stage: stage.clone(),
+            gpu: self.gpu.as_ref().map(|gpu| GpuStage::new(gpu, stage)).transpose()?,
+        })
+    }
+}
+
+struct StagedOracles<'a> {
+    names: &'a [String],
+    stage: Stage,
+    gpu: Option<Arc<GpuStage>>,
+}
+
+impl StagedOracles<'_> {
+    fn make(&self, name: &str) -> Result<Box<dyn Oracle>, OracleError> {
+        match name {
+            "sim" => Ok(Box::new(Sim::new(self.stage.clone()))),
+            "always" => Ok(Box::<Always>::default()),
+            _ => {
+                let stage = self.gpu.as_ref().expect("hardware is named only where it was opened");
+                Ok(Box::new(Hardware::new(stage)?))
+            }
+        }
+    }
+}
+
+/// The cullers of `names`, or the first three.
+pub(super) fn pick_cullers(
+    names: &[String],
+    cullers: &[CullerKind],
+) -> Result<Vec<CullerKind>, CliError> {
+    if names.is_empty() {
+        return Ok(cullers.iter().take(DEFAULT_CULLERS).copied().collect());
+    }
+    let pick = |name: &String| {
+        cullers.iter().find(|c| c.name == name).copied().ok_or_else(|| {
+            let known: Vec<&str> = cullers.iter().map(|c| c.name).collect();
+            CliError::Usage(format!("no culler is called '{name}'; there are {}", known.join(", ")))
+        })
+    };
+    names.iter().map(pick).collect()
+}
+
+/// The index of that name.
+pub(super) fn pick_index(name: &str) -> Result<IndexKind, CliError> {
+    INDEXES.iter().find(|i| i.name == name).copied().ok_or_else(|| {
+        let known: Vec<&str> = INDEXES.iter().map(|i| i.name).collect();
+        CliError::Usage(format!("no index is called '{name}'; there are {}", known.join(", ")))
+    })
+}
+
+/// The scene of that name or file, cut into parts.
+pub(super) fn open_world(name: &str, args: &SceneArgs) -> Result<World, CliError> {
+    let scene = generate::open(name, &args.knobs())?;
+    Ok(World::new(scene, PartitionKnobs { leaf_triangles: args.leaf }))
+}
+
+/// One scene's lanes, run.
+pub(super) struct Finished {
+    pub(super) world: World,
+    pub(super) traces: Vec<Trace>,
+    pub(super) gates: Vec<Gate>,
+}
+
+/// Keeps what was drawn in the latest frame.
+struct LastDrawn(Vec<PartId>);
+
+impl Observer for LastDrawn {
+    fn frame(&mut self, record: &FrameRecord<'_>) {
+        self.0 = record.drawn.to_vec();
+    }
+}
+
+/// Everything that stays the same from scene to scene.
+pub(super) struct Plan<'a> {
+    pub(super) cullers: Vec<CullerKind>,
+    pub(super) index: IndexKind,
+    pub(super) oracles: Oracles,
+    pub(super) args: &'a SceneArgs,
+}
+
+impl Plan<'_> {
+    /// Runs every lane of one scene.
+    pub(super) fn run(&self, name: &str, bar: &ProgressBar) -> Result<Finished, CliError> {
+        bar.set_message(format!("{name}: building"));
+        let world = open_world(name, self.args)?;
+        let frames = world.scene.frames;
+        let stage = Stage { partition: world.partition.clone(), viewport: world.scene.viewport };
+        let staged = self.oracles.stage(&stage)?;
+        let entries = world.entries();
+        let mut gates: Vec<Gate> = Vec::new();
+        let lanes: Vec<(&str, CullerKind)> = staged
+            .names
+            .iter()
+            .flat_map(|oracle| self.cullers.iter().map(move |&culler| (oracle.as_str(), culler)))
+            .collect();
+        gates.resize_with(lanes.len(), Gate::default);
+        bar.inc_length(u64::from(frames) * lanes.len() as u64);
+        let mut running = Vec::new();
+        for (&(oracle, kind), gate) in lanes.iter().zip(&mut gates) {
+            let oracle = staged.make(oracle)?;
+            let info = LaneInfo {
+                culler: kind.name.to_owned(),
+                oracle: oracle.name(),
+                device: oracle.device(),
+                replay: self.replay_line(name, &world, kind.name, oracle.name()),
+            };
+            let culler = self.factory(kind, &world, &entries);
+            running.push(Lane { info, culler, oracle, observer: gate });
+        }
+        bar.set_message(name.to_owned());
+        let mut tick = || {
+            bar.inc(1);
+            !INTERRUPTED.load(Ordering::Relaxed)
+        };
+        let traces = run_lanes(&world, frames, REPEATED_FRAMES, &mut running, &mut tick)?;
+        drop(running);
+        Ok(Finished { world, traces, gates })
+    }
+
+    /// What the first lane draws in frame `last`, after all frames before it.
+    pub(super) fn drawn_in(
+        &self,
+        world: &World,
+        last: u32,
+        bar: &ProgressBar,
+    ) -> Result<Vec<PartId>, CliError> {
+        let stage = Stage { partition: world.partition.clone(), viewport: world.scene.viewport };
+        let staged = self.oracles.stage(&stage)?;
+        let entries = world.entries();
+        let mut seen = LastDrawn(Vec::new());
+        let oracle = staged.make(&staged.names[0])?;
+        let info = LaneInfo {
+            culler: self.cullers[0].name.to_owned(),
+            oracle: oracle.name(),
+            device: None,
+            replay: String::new(),
+        };
+        let culler = self.factory(self.cullers[0], world, &entries);
+        let lane = Lane { info, culler, oracle, observer: &mut seen };
+        bar.inc_length(u64::from(last) + 1);
+        let mut tick = || {
+            bar.inc(1);
+            !INTERRUPTED.load(Ordering::Relaxed)
+        };
+        run_lanes(world, last + 1, 0, &mut [lane], &mut tick)?;
+        Ok(seen.0)
+    }
+
+    fn factory<'a>(
+        &'a self,
+        kind: CullerKind,
+        world: &'a World,
+        entries: &'a [Entry],
+    ) -> Box<dyn Fn() -> Box<dyn Culler> + 'a> {
+        Box::new(move || {
+            (kind.make)(CullerSetup {
+                partition: world.partition.clone(),
+                index: (self.index.build)(entries),
+                proxy: self.args.proxy.into(),
+            })
+        })
+    }
+
+    fn replay_line(&self, name: &str, world: &World, culler: &str, oracle: &str) -> String {
+        format!(
+            "plainsight replay --scene {} --seed {} --frames {} --culler {culler} --oracle {oracle}{}",
+            quoted(name),
+            world.scene.seed,
+            world.scene.frames,
+            self.args.replay_flags()
+        )
+    }
+}
+
+/// A bar on standard error, hidden where that is no terminal.
+pub(super) fn progress_bar() -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr_with_hz(8));
+    let style = ProgressStyle::with_template("{msg:<20} {bar:30} {pos}/{len} frames, {eta} left");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
+}
+
+/// Lets Ctrl-C end the run at the next frame. A second handler in one process changes nothing.
+pub(super) fn catch_interrupt() {
+    let _ = ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            // Asked twice: at once.
+            std::process::exit(i32::from(super::EXIT_INTERRUPTED));
+        }
+    });
+}
+
+pub(super) fn run(
+    args: &RunArgs,
+    cullers: &[CullerKind],
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
+    let out = args.out.as_deref().map(OutFile::create).transpose()?;
+    let plan = Plan {
+        cullers: pick_cullers(&args.culler, cullers)?,
+        index: pick_index(&args.scene_args.index)?,
+        oracles: Oracles::open(&args.oracle, args.scene_args.adapter.as_deref(), streams)?,
+        args: &args.scene_args,
+    };
+    let scenes: Vec<String> = if args.scene.is_empty() {
+        DEFAULT_SCENES.map(str::to_owned).to_vec()
+    } else {
+        args.scene.clone()
+    };
+    catch_interrupt();
+    let bar = progress_bar();
+    let (mut rows, mut lines, mut failed) = (Vec::new(), String::new(), false);
+    for name in &scenes {
+        let finished = plan.run(name, &bar);
+        if finished.is_err() {
+            bar.finish_and_clear();
+        }
+        let finished = finished?;
+        let difference = partition_difference(&finished.world);
+        for (trace, gate) in finished.traces.iter().zip(&finished.gates) {
+            let row = Row::new(&finished.world, trace, gate, difference);
+            let line = serde_json::to_string(&row).expect("a row is plain data");
+            if args.json {
+                bar.suspend(|| writeln!(streams.out, "{line}"))?;
+            }
+            lines += &format!("{line}\n");
+            rows.push(row);
+            failed |= !gate.held();
+            bar.suspend(|| tell_failures(gate, trace, streams))?;
+        }
+    }
+    bar.finish_and_clear();
+    if !args.json {
+        tell_table(&rows, streams)?;
+    }
+    if let Some(out) = out {
+        out.finish(lines.as_bytes())?;
+    }
+    Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
+}
+
+fn tell_table(rows: &[Row], streams: &mut Streams<'_>) -> Result<(), CliError> {
+    write!(streams.out, "{}", table(rows))?;
+    let mut said = Vec::new();
+    for row in rows {
+        if !said.contains(&&row.scene) {
+            said.push(&row.scene);
+            writeln!(
+                streams.out,
+                "{}: seed {}, {} frames, {} objects, {} triangles cut into {} in {} parts ({} pixels differ from the uncut scene)",
+                row.scene, row.seed, row.frames, row.objects, row.triangles, row.fragments, row.parts,
+                row.partition_difference_pixels
+            )?;
+        }
+    }
+    if let Some(device) = rows.iter().find_map(|row| row.device.as_ref()) {
+        writeln!(streams.out, "hardware: {device}")?;
+    }
+    let held = rows.iter().filter(|row| row.verdict == "held").count();
+    let word = if held == rows.len() { "held" } else { "FAILED" };
+    writeln!(streams.out, "verdict: {word} ({held} of {} lanes held; figures per frame)", rows.len())?;
+    Ok(())
+}
+
+/// What failed, and the line that replays it.
+fn tell_failures(gate: &Gate, trace: &Trace, streams: &mut Streams<'_>) -> std::io::Result<()> {
+    if !gate.held() {
+        let lane = &trace.lane;
+        writeln!(streams.talk, "FAILED: {} on {}", lane.culler, lane.oracle)?;
+        gate.failures().iter().try_for_each(|line| writeln!(streams.talk, "  {line}"))?;
+        writeln!(streams.talk, "  replay: {} --expect {:016x}", lane.replay, trace.hash())?;
+    }
+    Ok(())
+}
+
+pub(super) fn replay(
+    args: &ReplayArgs,
+    cullers: &[CullerKind],
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
+    let adapter = args.scene_args.adapter.as_deref();
+    let plan = Plan {
+        cullers: pick_cullers(std::slice::from_ref(&args.culler), cullers)?,
+        index: pick_index(&args.scene_args.index)?,
+        oracles: Oracles::open(std::slice::from_ref(&args.oracle), adapter, streams)?,
+        args: &args.scene_args,
+    };
+    catch_interrupt();
+    let bar = progress_bar();
+    let finished = plan.run(&args.scene, &bar);
+    bar.finish_and_clear();
+    let finished = finished?;
+    let (trace, gate) = (&finished.traces[0], &finished.gates[0]);
+    for frame in &trace.frames {
+        if args.json {
+            let line = json!({
+                "schema": crate::report::JSON_SCHEMA,
+                "frame": frame.frame,
+                "drawn_parts": frame.drawn_parts,
+                "visible_parts": frame.visible_parts,
+                "queries": frame.counts.queries,
+                "visible_answers": frame.counts.visible_answers,
+                "round_trips": frame.counts.round_trips,
+                "events_hash": format!("{:016x}", frame.events_hash),
+                "truth_hash": format!("{:016x}", frame.truth_hash),
+                "image_hash": format!("{:016x}", frame.image_hash),
+                "wall_ms": frame.wall_ns as f64 / 1e6,
+            });
+            writeln!(streams.out, "{line}")?;
+        } else {
+            writeln!(
+                streams.out,
+                "frame {:>4}: drew {:>5}, visible {:>5}, {:>5} queries, {:>4} trips, {:>7.1} ms, events {:016x}",
+                frame.frame, frame.drawn_parts, frame.visible_parts, frame.counts.queries,
+                frame.counts.round_trips, frame.wall_ns as f64 / 1e6, frame.events_hash
+            )?;
+        }
+    }
+    let hash = format!("{:016x}", trace.hash());
+    tell_failures(gate, trace, streams)?;
+    let mut held = gate.held();
+    if let Some(expected) = args.expect.as_ref().filter(|expected| **expected != hash) {
+        writeln!(streams.talk, "trace hash {hash} is not the expected {expected}: another build, device or scene")?;
+        held = false;
+    }
+    if !args.json {
+        writeln!(streams.out, "trace hash {hash}, verdict: {}", if held { "held" } else { "FAILED" })?;
+    }
+    Ok(if held { EXIT_HELD } else { EXIT_FAILED })
+}
