@@ -9,6 +9,7 @@
 //! asking order, so that no culler sees arrival times. An answer may err only towards "visible".
 
 mod always;
+mod proxy_mesh;
 mod sim;
 #[cfg_attr(not(feature = "hardware"), path = "no_wgpu.rs")]
 pub mod wgpu;
@@ -19,6 +20,8 @@ use crate::part::{PartId, Partition};
 use crate::scene::Viewport;
 
 pub use always::Always;
+#[cfg(feature = "hardware")]
+use proxy_mesh::box_proxy_triangles;
 pub use sim::{Sim, part_draw};
 
 

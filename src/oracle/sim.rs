@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 
 use plainsight_reference::{Draw, Image, fast};
 
+use super::proxy_mesh::box_triangles;
 use super::{Answer, FrameView, Oracle, OracleError, Proxy, QueryId, ReadBack, Stage};
 use crate::part::{PartId, Partition};
 
@@ -129,17 +130,3 @@ impl Oracle for Sim {
         Ok(None)
     }
 }
-
-/// The twelve triangles of a box; corner bit 0 is x, bit 1 y, bit 2 z.
-#[must_use]
-pub(super) fn box_triangles(min: [f32; 3], max: [f32; 3]) -> ([[f32; 3]; 8], [[u32; 3]; 12]) {
-    let corner = |i: usize| std::array::from_fn(|axis| if i >> axis & 1 == 0 { min } else { max }[axis]);
-    let faces: [[u32; 4]; 6] =
-        [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
-    let triangle = |i: usize| {
-        let [a, b, c, d] = faces[i / 2];
-        if i.is_multiple_of(2) { [a, b, c] } else { [a, c, d] }
-    };
-    (std::array::from_fn(corner), std::array::from_fn(triangle))
-}
-

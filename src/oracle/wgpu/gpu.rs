@@ -1,0 +1,109 @@
+//! The device: chosen by name, opened once, shared by everything that draws.
+
+use std::sync::{Arc, Mutex};
+
+use crate::oracle::OracleError;
+
+/// Said where no Vulkan device is found.
+pub const NO_DEVICE: &str = "no Vulkan device found; install Mesa's lavapipe (Debian, Ubuntu: apt-get \
+install mesa-vulkan-drivers), or run tests/run.sh, which does";
+
+/// An open device.
+pub struct Gpu {
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    name: String,
+    /// The first thing the device complained about.
+    trouble: Arc<Mutex<Option<String>>>,
+}
+
+fn all_adapters() -> Vec<wgpu::Adapter> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::VULKAN;
+    // The same flags in every build profile: validation layers are not part of the bench.
+    descriptor.flags = wgpu::InstanceFlags::empty();
+    let instance = wgpu::Instance::new(descriptor);
+    pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN))
+}
+
+fn describe(adapter: &wgpu::Adapter) -> String {
+    let info = adapter.get_info();
+    format!("{} ({})", info.name, info.driver_info).replace(" ()", "")
+}
+
+impl Gpu {
+    /// Names of the Vulkan adapters, in the loader's order.
+    #[must_use]
+    pub fn adapters() -> Vec<String> {
+        all_adapters().iter().map(describe).collect()
+    }
+
+    /// Opens the adapter whose name holds `adapter`, whatever the case; without a name the first CPU
+    /// adapter (lavapipe), else the first of all.
+    ///
+    /// # Errors
+    /// [`OracleError::NoDevice`] where none fits; the message names those that were found.
+    pub fn open(adapter: Option<&str>) -> Result<Arc<Self>, OracleError> {
+        let found = all_adapters();
+        let is_cpu =
+            |a: &&wgpu::Adapter| a.get_info().device_type == wgpu::DeviceType::Cpu;
+        let chosen = match adapter {
+            Some(name) => {
+                let wanted = name.to_lowercase();
+                found.iter().find(|a| describe(a).to_lowercase().contains(&wanted))
+            }
+            None => found.iter().find(is_cpu).or(found.first()),
+        };
+        let Some(chosen) = chosen else {
+            let names: Vec<String> = found.iter().map(describe).collect();
+            return Err(OracleError::NoDevice(match adapter {
+                Some(name) if !names.is_empty() => {
+                    format!("no adapter is called '{name}'; there are {}", names.join(", "))
+                }
+                _ => NO_DEVICE.to_owned(),
+            }));
+        };
+        let descriptor =
+            wgpu::DeviceDescriptor { required_limits: chosen.limits(), ..Default::default() };
+        let (device, queue) = pollster::block_on(chosen.request_device(&descriptor))
+            .map_err(|error| OracleError::NoDevice(format!("{}: {error}", describe(chosen))))?;
+        let trouble = Arc::new(Mutex::new(None));
+        let note = |trouble: &Arc<Mutex<Option<String>>>, what: String| {
+            // A poisoned lock still holds the first message.
+            let mut slot = trouble.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            slot.get_or_insert(what);
+        };
+        let (uncaptured, lost) = (Arc::clone(&trouble), Arc::clone(&trouble));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            note(&uncaptured, error.to_string());
+        }));
+        device.set_device_lost_callback(move |reason, message| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                note(&lost, format!("{reason:?}: {message}"));
+            }
+        });
+        Ok(Arc::new(Self { device, queue, name: describe(chosen), trouble }))
+    }
+
+    /// The adapter's name and driver.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Whether the device has complained of anything so far.
+    ///
+    /// # Errors
+    /// [`OracleError::Lost`] with its first complaint.
+    pub(super) fn healthy(&self) -> Result<(), OracleError> {
+        let trouble = self.trouble.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        trouble.as_ref().map_or(Ok(()), |what| Err(OracleError::Lost(what.replace('\n', " "))))
+    }
+
+    /// Waits until the device has done all that was submitted up to `index`.
+    pub(super) fn wait(&self, index: Option<wgpu::SubmissionIndex>) -> Result<(), OracleError> {
+        let poll = wgpu::PollType::Wait { submission_index: index, timeout: None };
+        self.device.poll(poll).map_err(|error| OracleError::Lost(error.to_string()))?;
+        self.healthy()
+    }
+}

@@ -1,0 +1,396 @@
+//! The oracle itself: a command stream of draws and questions, sent in batches.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use super::images::Images;
+use super::stage::GpuStage;
+use crate::oracle::{
+    Answer, FrameView, Oracle, OracleError, Proxy, QueryId, ReadBack, box_proxy_triangles,
+};
+use crate::part::{ObjectId, PartId};
+use crate::scene::Viewport;
+
+/// Queries in one pass; a batch with more has several passes. Mesa 22.3.6's lavapipe returned wrong
+/// counts for some empty queries in passes of 768 and more; 640 were right.
+pub const QUERIES_PER_PASS: usize = 128;
+/// Bytes of one result.
+const RESULT_BYTES: u64 = 8;
+
+/// One thing to do, in the order it was said.
+#[derive(Clone, Copy)]
+enum Event {
+    Draw(PartId),
+    /// A question with its run of proxy vertices.
+    Ask { first_vertex: u32, end_vertex: u32 },
+}
+
+/// What a batch needs on the device, kept for the next one.
+struct Slot {
+    queries: Vec<wgpu::QuerySet>,
+    resolved: wgpu::Buffer,
+    staging: wgpu::Buffer,
+    proxies: wgpu::Buffer,
+}
+
+/// A batch on its way.
+struct Flight {
+    slot: Option<Slot>,
+    submission: wgpu::SubmissionIndex,
+    queries: Vec<QueryId>,
+}
+
+/// Occlusion queries of a Vulkan device.
+pub struct Hardware {
+    stage: Arc<GpuStage>,
+    images: Images,
+    redraw_images: Option<Images>,
+    matrices: wgpu::Buffer,
+    bindings: wgpu::BindGroup,
+    cleared: bool,
+    asked: u32,
+    events: Vec<Event>,
+    open: Vec<QueryId>,
+    proxy_vertices: Vec<[f32; 4]>,
+    flights: VecDeque<Flight>,
+    free: Vec<Slot>,
+}
+
+impl Hardware {
+    /// An oracle with targets of its own over shared geometry.
+    ///
+    /// # Errors
+    /// [`OracleError::Lost`] where the device refuses.
+    pub fn new(stage: &Arc<GpuStage>) -> Result<Self, OracleError> {
+        let device = &stage.gpu.device;
+        let objects = u64::from(stage.stage.partition.object_count().max(1));
+        let matrices = device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: objects * 64,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &stage.layout,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: matrices.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: stage.first_part.as_entire_binding() },
+            ],
+        });
+        let images = Images::new(&stage.gpu, stage.stage.viewport, false);
+        stage.gpu.healthy()?;
+        Ok(Self {
+            stage: Arc::clone(stage),
+            images,
+            redraw_images: None,
+            matrices,
+            bindings,
+            cleared: false,
+            asked: 0,
+            events: Vec::new(),
+            open: Vec::new(),
+            proxy_vertices: Vec::new(),
+            flights: VecDeque::new(),
+            free: Vec::new(),
+        })
+    }
+
+    fn encoder(&self) -> wgpu::CommandEncoder {
+        self.stage.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    }
+
+    /// A slot with room for this batch, made or reused.
+    fn slot(&mut self) -> Slot {
+        let device = &self.stage.gpu.device;
+        let sets = self.open.len().div_ceil(QUERIES_PER_PASS);
+        let bytes = (sets * QUERIES_PER_PASS) as u64 * RESULT_BYTES;
+        let vertices = size_of_val(self.proxy_vertices.as_slice()) as u64;
+        let buffer = |size: u64, usage| {
+            let size = size.next_power_of_two();
+            device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
+        };
+        let results = |size| {
+            (
+                buffer(size, wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
+                buffer(size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
+            )
+        };
+        let proxies =
+            |size| buffer(size, wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST);
+        let mut slot = self.free.pop().unwrap_or_else(|| {
+            let (resolved, staging) = results(bytes);
+            Slot { queries: Vec::new(), resolved, staging, proxies: proxies(vertices) }
+        });
+        if slot.resolved.size() < bytes {
+            (slot.resolved, slot.staging) = results(bytes);
+        }
+        if slot.proxies.size() < vertices {
+            slot.proxies = proxies(vertices);
+        }
+        while slot.queries.len() < sets {
+            slot.queries.push(device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: None,
+                ty: wgpu::QueryType::Occlusion,
+                count: QUERIES_PER_PASS as u32,
+            }));
+        }
+        slot
+    }
+
+    /// Encodes the batch's events from `from` on as one pass of at most [`QUERIES_PER_PASS`]
+    /// questions; returns where it stopped.
+    fn encode_pass(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        slot: Option<(&Slot, usize)>,
+        from: usize,
+        clear: bool,
+    ) -> usize {
+        let load = if clear { wgpu::LoadOp::Clear(1.0) } else { wgpu::LoadOp::Load };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            depth_stencil_attachment: Some(depth_attachment(&self.images, load)),
+            occlusion_query_set: slot.map(|(slot, set)| &slot.queries[set]),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &self.bindings, &[]);
+        let mut queries = 0;
+        let mut drawing: Option<u32> = None;
+        for (place, event) in self.events.iter().enumerate().skip(from) {
+            match *event {
+                Event::Draw(part) => {
+                    let partition = &self.stage.stage.partition;
+                    let (object, local) = partition.locate(part);
+                    let number = partition.mesh_index(object);
+                    if drawing != Some(number) {
+                        let mesh = &self.stage.meshes[number as usize];
+                        pass.set_pipeline(&self.stage.draw);
+                        pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+                        pass.set_index_buffer(mesh.by_part.slice(..), wgpu::IndexFormat::Uint32);
+                        drawing = Some(number);
+                    }
+                    let this = &partition.mesh(object).parts[local as usize];
+                    let first = this.first_triangle * 3;
+                    let indices = first..first + this.triangle_count * 3;
+                    pass.draw_indexed(indices, this.first_vertex as i32, object.0..object.0 + 1);
+                }
+                Event::Ask { first_vertex, end_vertex } => {
+                    let Some((slot, _)) = slot else { continue };
+                    if queries == QUERIES_PER_PASS {
+                        return place;
+                    }
+                    drawing = None;
+                    pass.set_pipeline(&self.stage.ask);
+                    pass.set_vertex_buffer(0, slot.proxies.slice(..));
+                    pass.begin_occlusion_query(queries as u32);
+                    pass.draw(first_vertex..end_vertex, 0..1);
+                    pass.end_occlusion_query();
+                    queries += 1;
+                }
+            }
+        }
+        self.events.len()
+    }
+
+    /// Draws `parts` in draw-index order into `encoder`.
+    fn encode_redraw(&self, encoder: &mut wgpu::CommandEncoder, images: &Images, parts: &[PartId]) {
+        let partition = &self.stage.stage.partition;
+        let mut runs: Vec<(ObjectId, std::ops::Range<u32>, bool)> = Vec::new();
+        let mut picked: Vec<[u32; 3]> = Vec::new();
+        let mut rest = parts;
+        while let Some(&part) = rest.first() {
+            let (object, _) = partition.locate(part);
+            let first = partition.first_part(object).0;
+            let mesh = partition.mesh(object);
+            let end = first + mesh.parts.len() as u32;
+            let (these, later) = rest.split_at(rest.partition_point(|p| p.0 < end));
+            rest = later;
+            if these.len() == mesh.parts.len() {
+                runs.push((object, 0..mesh.triangles.len() as u32 * 3, true));
+                continue;
+            }
+            let mut wanted = vec![false; mesh.parts.len()];
+            these.iter().for_each(|p| wanted[(p.0 - first) as usize] = true);
+            let ranked = &self.stage.meshes[partition.mesh_index(object) as usize].ranked;
+            let from = picked.len() as u32 * 3;
+            let of = ranked.iter().zip(&mesh.part_of_rank);
+            picked.extend(of.filter(|(_, part)| wanted[**part as usize]).map(|(t, _)| *t));
+            runs.push((object, from..picked.len() as u32 * 3, false));
+        }
+        let device = &self.stage.gpu.device;
+        let size = (size_of_val(picked.as_slice()) as u64).max(16);
+        let usage = wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST;
+        let indices = device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false });
+        self.stage.gpu.queue.write_buffer(&indices, 0, bytemuck::cast_slice(&picked));
+        let ids = images.ids_view().map(|view| wgpu::RenderPassColorAttachment {
+            view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                store: wgpu::StoreOp::Store,
+            },
+        });
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[ids],
+            depth_stencil_attachment: Some(depth_attachment(images, wgpu::LoadOp::Clear(1.0))),
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.stage.draw_ids);
+        pass.set_bind_group(0, &self.bindings, &[]);
+        for (object, run, whole) in runs {
+            let mesh = &self.stage.meshes[partition.mesh_index(object) as usize];
+            pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+            let from = if whole { &mesh.by_rank } else { &indices };
+            pass.set_index_buffer(from.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(run, 0, object.0..object.0 + 1);
+        }
+    }
+}
+
+fn depth_attachment(
+    images: &Images,
+    load: wgpu::LoadOp<f32>,
+) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view: &images.depth_view,
+        depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
+        stencil_ops: None,
+    }
+}
+
+/// Two triangles over whole pixels at one depth, w = 1.
+///
+/// The window position of a pixel edge comes back as ndc·(W/2) + W/2 in f32: for sides up to 16384
+/// the rounding of ndc (2⁻²⁵ · W/2) and of the sum (2⁻²⁴ · W) stay under 2⁻⁹ pixel, half a sub-pixel, so
+/// snapping restores the edge and exactly these pixels are covered.
+fn rectangle(viewport: Viewport, min: [u32; 2], max: [u32; 2], depth: f32) -> [[f32; 4]; 6] {
+    let across = |x: u32| (f64::from(x) * 2.0 / f64::from(viewport.width) - 1.0) as f32;
+    let down = |y: u32| (1.0 - f64::from(y) * 2.0 / f64::from(viewport.height)) as f32;
+    let (x0, y0, x1, y1) = (across(min[0]), down(min[1]), across(max[0]), down(max[1]));
+    let [a, b, c, d] = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]].map(|[x, y]| [x, y, depth, 1.0]);
+    [a, b, c, a, c, d]
+}
+
+impl Oracle for Hardware {
+    fn name(&self) -> &'static str {
+        "hardware"
+    }
+
+    fn device(&self) -> Option<String> {
+        Some(self.stage.gpu.name().to_owned())
+    }
+
+    fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {
+        while !self.flights.is_empty() {
+            self.collect(&mut Vec::new())?;
+        }
+        let matrices = bytemuck::cast_slice(view.clip_from_object);
+        self.stage.gpu.queue.write_buffer(&self.matrices, 0, matrices);
+        self.cleared = false;
+        self.asked = 0;
+        self.events.clear();
+        self.open.clear();
+        self.proxy_vertices.clear();
+        self.stage.gpu.healthy()
+    }
+
+    fn draw_part(&mut self, part: PartId) {
+        self.events.push(Event::Draw(part));
+    }
+
+    fn ask(&mut self, proxy: &Proxy) -> QueryId {
+        let first_vertex = self.proxy_vertices.len() as u32;
+        match *proxy {
+            Proxy::Rectangle { min, max, depth } => {
+                self.proxy_vertices.extend(rectangle(self.stage.stage.viewport, min, max, depth));
+            }
+            Proxy::Box { clip_from_box, min, max } => {
+                self.proxy_vertices.extend(box_proxy_triangles(&clip_from_box, min, max));
+            }
+        }
+        let end_vertex = self.proxy_vertices.len() as u32;
+        self.events.push(Event::Ask { first_vertex, end_vertex });
+        let query = QueryId(self.asked);
+        self.asked += 1;
+        self.open.push(query);
+        query
+    }
+
+    fn submit(&mut self) -> Result<(), OracleError> {
+        let mut encoder = self.encoder();
+        let slot = (!self.open.is_empty()).then(|| self.slot());
+        if let Some(slot) = &slot {
+            let vertices = bytemuck::cast_slice(&self.proxy_vertices);
+            self.stage.gpu.queue.write_buffer(&slot.proxies, 0, vertices);
+        }
+        let (mut place, mut set) = (0, 0);
+        while place < self.events.len() || !self.cleared {
+            let clear = !std::mem::replace(&mut self.cleared, true);
+            // Draws after the last question of a full set go with the next pass, which may have none.
+            let with = slot.as_ref().filter(|_| set * QUERIES_PER_PASS < self.open.len());
+            place = self.encode_pass(&mut encoder, with.map(|slot| (slot, set)), place, clear);
+            set += 1;
+        }
+        if let Some(slot) = &slot {
+            let sets = self.open.len().div_ceil(QUERIES_PER_PASS);
+            let bytes = self.open.len() as u64 * RESULT_BYTES;
+            for set in 0..sets {
+                let count = (self.open.len() - set * QUERIES_PER_PASS).min(QUERIES_PER_PASS);
+                let offset = (set * QUERIES_PER_PASS) as u64 * RESULT_BYTES;
+                encoder.resolve_query_set(&slot.queries[set], 0..count as u32, &slot.resolved, offset);
+            }
+            encoder.copy_buffer_to_buffer(&slot.resolved, 0, &slot.staging, 0, bytes);
+        }
+        let submission = self.stage.gpu.queue.submit([encoder.finish()]);
+        let queries = std::mem::take(&mut self.open);
+        if let Some(slot) = &slot {
+            let bytes = queries.len() as u64 * RESULT_BYTES;
+            slot.staging.slice(..bytes).map_async(wgpu::MapMode::Read, |_| {});
+        }
+        self.events.clear();
+        self.proxy_vertices.clear();
+        self.flights.push_back(Flight { slot, submission, queries });
+        self.stage.gpu.healthy()
+    }
+
+    fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
+        let Some(flight) = self.flights.pop_front() else { return Ok(()) };
+        self.stage.gpu.wait(Some(flight.submission))?;
+        let Some(slot) = flight.slot else { return Ok(()) };
+        {
+            let bytes = flight.queries.len() as u64 * RESULT_BYTES;
+            let mapped = slot
+                .staging
+                .slice(..bytes)
+                .get_mapped_range()
+                .map_err(|error| OracleError::Lost(error.to_string()))?;
+            let counts = mapped.chunks_exact(RESULT_BYTES as usize);
+            answers.extend(flight.queries.iter().zip(counts).map(|(&query, count)| Answer {
+                query,
+                visible: count.iter().any(|&byte| byte != 0),
+            }));
+        }
+        slot.staging.unmap();
+        self.free.push(slot);
+        Ok(())
+    }
+
+    fn read_back(&mut self) -> Result<Option<ReadBack>, OracleError> {
+        self.submit()?;
+        self.collect(&mut Vec::new())?;
+        self.images.read_back(&self.stage.gpu, self.encoder()).map(Some)
+    }
+
+    fn redraw(&mut self, parts: &[PartId]) -> Result<Option<ReadBack>, OracleError> {
+        let images = self
+            .redraw_images
+            .take()
+            .unwrap_or_else(|| Images::new(&self.stage.gpu, self.stage.stage.viewport, true));
+        let mut encoder = self.encoder();
+        self.encode_redraw(&mut encoder, &images, parts);
+        let read_back = images.read_back(&self.stage.gpu, encoder);
+        self.redraw_images = Some(images);
+        read_back.map(Some)
+    }
+}

@@ -1,0 +1,203 @@
+//! What stays on the device for a whole run: geometry and pipelines, shared by all oracles of a
+//! scene.
+
+use std::sync::Arc;
+
+use wgpu::util::DeviceExt;
+
+use super::gpu::Gpu;
+use crate::oracle::{OracleError, Stage};
+use crate::part::{ObjectId, PartedMesh};
+
+/// Depth of every target.
+pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// Part id plus one.
+pub(super) const IDS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+
+/// A vertex on the device: a position and the number of its part in the mesh. Parts share no
+/// vertices, so all three corners of a triangle agree.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Vertex {
+    position: [f32; 3],
+    part: u32,
+}
+
+/// One mesh on the device.
+pub(super) struct GpuMesh {
+    pub(super) vertices: wgpu::Buffer,
+    /// Grouped by part, counted from the part's first vertex.
+    pub(super) by_part: wgpu::Buffer,
+    /// In the order of ranks, counted from the mesh's first vertex.
+    pub(super) by_rank: wgpu::Buffer,
+    /// The same on this side, to pick parts from.
+    pub(super) ranked: Vec<[u32; 3]>,
+}
+
+/// Geometry and pipelines of one scene.
+pub struct GpuStage {
+    pub(super) gpu: Arc<Gpu>,
+    pub(super) stage: Stage,
+    pub(super) meshes: Vec<GpuMesh>,
+    pub(super) first_part: wgpu::Buffer,
+    pub(super) layout: wgpu::BindGroupLayout,
+    /// Less, writes depth.
+    pub(super) draw: wgpu::RenderPipeline,
+    /// Less, writes depth and part ids.
+    pub(super) draw_ids: wgpu::RenderPipeline,
+    /// Less or equal, writes nothing.
+    pub(super) ask: wgpu::RenderPipeline,
+}
+
+impl GpuStage {
+    /// Uploads every mesh once and builds the pipelines.
+    ///
+    /// # Errors
+    /// [`OracleError::Lost`] where the device refuses.
+    pub fn new(gpu: &Arc<Gpu>, stage: &Stage) -> Result<Arc<Self>, OracleError> {
+        let device = &gpu.device;
+        let limit = device.limits().max_texture_dimension_2d;
+        if stage.viewport.width.max(stage.viewport.height) > limit {
+            let what = format!("{} draws at most {limit} pixels a side", gpu.name());
+            return Err(OracleError::Lost(what));
+        }
+        let meshes = stage.partition.meshes().iter().map(|mesh| upload(device, mesh)).collect();
+        let objects = 0..stage.partition.object_count();
+        let mut firsts: Vec<u32> =
+            objects.map(|object| stage.partition.first_part(ObjectId(object)).0).collect();
+        // A binding may not be empty.
+        firsts.resize(firsts.len().max(1), 0);
+        let first_part = buffer(device, bytemuck::cast_slice(&firsts), wgpu::BufferUsages::STORAGE);
+        let storage = |binding| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::VERTEX,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Storage { read_only: true },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        };
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: None,
+            entries: &[storage(0), storage(1)],
+        });
+        let pipelines = Pipelines::new(device, &layout);
+        let made = Arc::new(Self {
+            gpu: Arc::clone(gpu),
+            stage: stage.clone(),
+            meshes,
+            first_part,
+            draw: pipelines.part(None),
+            draw_ids: pipelines.part(Some(IDS)),
+            ask: pipelines.proxy(),
+            layout,
+        });
+        gpu.wait(None)?;
+        Ok(made)
+    }
+}
+
+fn buffer(device: &wgpu::Device, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    // An empty mesh still has buffers to bind.
+    let contents = if contents.is_empty() { &[0; 16] } else { contents };
+    device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
+}
+
+fn upload(device: &wgpu::Device, mesh: &PartedMesh) -> GpuMesh {
+    let mut vertices = Vec::with_capacity(mesh.positions.len());
+    let mut absolute = Vec::with_capacity(mesh.triangles.len());
+    for (number, part) in mesh.parts.iter().enumerate() {
+        let run = part.first_vertex as usize..(part.first_vertex + part.vertex_count) as usize;
+        let of = |&position: &[f32; 3]| Vertex { position, part: number as u32 };
+        vertices.extend(mesh.positions[run].iter().map(of));
+        let run = part.first_triangle as usize..(part.first_triangle + part.triangle_count) as usize;
+        let from_first = |t: &[u32; 3]| t.map(|corner| corner + part.first_vertex);
+        absolute.extend(mesh.triangles[run].iter().map(from_first));
+    }
+    let ranked: Vec<[u32; 3]> =
+        mesh.triangle_of_rank.iter().map(|&place| absolute[place as usize]).collect();
+    let index = wgpu::BufferUsages::INDEX;
+    GpuMesh {
+        vertices: buffer(device, bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
+        by_part: buffer(device, bytemuck::cast_slice(&mesh.triangles), index),
+        by_rank: buffer(device, bytemuck::cast_slice(&ranked), index),
+        ranked,
+    }
+}
+
+struct Pipelines<'a> {
+    device: &'a wgpu::Device,
+    shader: wgpu::ShaderModule,
+    layout: wgpu::PipelineLayout,
+}
+
+impl<'a> Pipelines<'a> {
+    fn new(device: &'a wgpu::Device, bindings: &wgpu::BindGroupLayout) -> Self {
+        let shader = device.create_shader_module(wgpu::include_wgsl!("shader.wgsl"));
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: None,
+            bind_group_layouts: &[Some(bindings)],
+            immediate_size: 0,
+        });
+        Self { device, shader, layout }
+    }
+
+    fn part(&self, ids: Option<wgpu::TextureFormat>) -> wgpu::RenderPipeline {
+        let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Uint32];
+        let vertices = wgpu::VertexBufferLayout {
+            array_stride: size_of::<Vertex>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &attributes,
+        };
+        self.build("part_vertex", vertices, ids, (wgpu::CompareFunction::Less, true))
+    }
+
+    fn proxy(&self) -> wgpu::RenderPipeline {
+        let attributes = wgpu::vertex_attr_array![0 => Float32x4];
+        let vertices = wgpu::VertexBufferLayout {
+            array_stride: 16,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &attributes,
+        };
+        self.build("proxy_vertex", vertices, None, (wgpu::CompareFunction::LessEqual, false))
+    }
+
+    fn build(
+        &self,
+        entry: &str,
+        vertices: wgpu::VertexBufferLayout<'_>,
+        ids: Option<wgpu::TextureFormat>,
+        (compare, write): (wgpu::CompareFunction, bool),
+    ) -> wgpu::RenderPipeline {
+        let targets = [ids.map(wgpu::ColorTargetState::from)];
+        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: None,
+            layout: Some(&self.layout),
+            vertex: wgpu::VertexState {
+                module: &self.shader,
+                entry_point: Some(entry),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                buffers: &[Some(vertices)],
+            },
+            // Both faces count, nothing is culled.
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH,
+                depth_write_enabled: Some(write),
+                depth_compare: Some(compare),
+                stencil: wgpu::StencilState::default(),
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState::default(),
+            fragment: ids.map(|_| wgpu::FragmentState {
+                module: &self.shader,
+                entry_point: Some("part_fragment"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                targets: &targets,
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}
