@@ -15,15 +15,15 @@ use crate::scene::{
 };
 
 /// Blobs at scale 1.
-const BLOBS: f64 = 100.0;
-/// Triangles of one blob; 100 of them are 1.2 million.
-const BLOB_TRIANGLES: u32 = 12_000;
+const BLOBS: f64 = 200.0;
+/// Triangles of one blob; 200 of them are 1.2 million.
+const BLOB_TRIANGLES: u32 = 6_000;
 /// Blobs of different shape.
 const SHAPES: u64 = 4;
 /// Triangles that imported meshes should have together at scale 1.
 const IMPORTED_TRIANGLES: f64 = 1_400_000.0;
 /// Blob radii per side of the box and cube root of the number: below 2 they interpenetrate.
-const SPACING: f64 = 1.35;
+const SPACING: f64 = 0.9;
 
 pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
     let (meshes, count) = meshes(chosen)?;

@@ -12,7 +12,7 @@ use crate::scene::{
 };
 
 /// Blocks along a side at scale 1.
-const BLOCKS: f64 = 8.0;
+const BLOCKS: f64 = 7.0;
 /// World units from one block to the next, street included.
 const PITCH: f64 = 40.0;
 /// Width of a street.
@@ -99,7 +99,7 @@ fn building(shape: &mut Stream) -> Mesh {
             (DVec3::new(high, base, high), DVec3::NEG_X * width, DVec3::Z),
             (DVec3::new(low, base, high), DVec3::NEG_Z * width, DVec3::NEG_X),
         ];
-        let columns = 12.0;
+        let columns = 8.0;
         for (origin, across, outward) in walls {
             // Every third row and column of the fine grid stands out: piers and ledges.
             let cells = [columns as u32 * 3, floors as u32 * 3];

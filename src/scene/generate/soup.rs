@@ -16,7 +16,7 @@ const OBJECTS: f64 = 400.0;
 /// Meshes to choose from, fewer at small scales.
 const MESHES: f64 = 24.0;
 /// Pieces (triangles or boxes) of a mesh at scale 1.
-const PIECES: f64 = 1800.0;
+const PIECES: f64 = 700.0;
 /// World units from the middle to a wall of the space.
 const SPACE: f64 = 20.0;
 
