@@ -72,9 +72,11 @@ fn draw_chunk(image: &mut Image, draws: &[Draw<'_>]) {
         })
         .collect();
     let rows = (viewport.height as usize).div_ceil(threads * BANDS_PER_THREAD).max(1);
-    image.samples_mut().par_chunks_mut(rows * viewport.width as usize).enumerate().for_each(
-        |(band, samples)| paint(samples, viewport, (band * rows) as i32, &ready),
-    );
+    image
+        .samples_mut()
+        .par_chunks_mut(rows * viewport.width as usize)
+        .enumerate()
+        .for_each(|(band, samples)| paint(samples, viewport, (band * rows) as i32, &ready));
 }
 
 /// How many fragments of `draw` have a depth less than or equal to the stored one; equal to
@@ -124,7 +126,12 @@ impl Ready {
         let [a, b, c] = triangle.v;
         let columns = span(a.x, b.x, c.x, viewport.width);
         let rows = span(a.y, b.y, c.y, viewport.height);
-        (columns[0] <= columns[1] && rows[0] <= rows[1]).then_some(Self { triangle, id, columns, rows })
+        (columns[0] <= columns[1] && rows[0] <= rows[1]).then_some(Self {
+            triangle,
+            id,
+            columns,
+            rows,
+        })
     }
 }
 

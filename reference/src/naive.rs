@@ -33,14 +33,18 @@ fn fragments(viewport: Viewport, draw: &Draw<'_>, mut emit: impl FnMut(usize, f3
         let corners = triangle.map(|vertex| draw.clip_vertex(vertex));
         let Some(polygon) = window.clipper.clip(corners) else { continue };
         for Oriented { v, area } in window.fan(&polygon) {
-            let low = |at: [i32; 3]| (i64::from(at.into_iter().min().unwrap_or(0)) / SUBPIXELS - 1).max(0);
+            let low = |at: [i32; 3]| {
+                (i64::from(at.into_iter().min().unwrap_or(0)) / SUBPIXELS - 1).max(0)
+            };
             let high = |at: [i32; 3], side: u32| {
-                (i64::from(at.into_iter().max().unwrap_or(0)) / SUBPIXELS + 1).min(i64::from(side) - 1)
+                (i64::from(at.into_iter().max().unwrap_or(0)) / SUBPIXELS + 1)
+                    .min(i64::from(side) - 1)
             };
             let (xs, ys) = (v.map(|v| v.x), v.map(|v| v.y));
             for row in low(ys)..=high(ys, viewport.height) {
                 for column in low(xs)..=high(xs, viewport.width) {
-                    let (x, y) = (column * SUBPIXELS + SUBPIXELS / 2, row * SUBPIXELS + SUBPIXELS / 2);
+                    let (x, y) =
+                        (column * SUBPIXELS + SUBPIXELS / 2, row * SUBPIXELS + SUBPIXELS / 2);
                     let opposite = |i: usize| (v[(i + 1) % 3], v[(i + 2) % 3]);
                     let e = [0, 1, 2].map(|i| edge(opposite(i).0, opposite(i).1, x, y));
                     let inside = |i: usize| {

@@ -40,10 +40,7 @@ impl Window {
     }
 
     /// The window triangles of a clipped polygon, fanned from its first corner.
-    pub(crate) fn fan<'a>(
-        &'a self,
-        polygon: &'a Polygon,
-    ) -> impl Iterator<Item = Oriented> + 'a {
+    pub(crate) fn fan<'a>(&'a self, polygon: &'a Polygon) -> impl Iterator<Item = Oriented> + 'a {
         let corners = polygon.corners();
         let first = self.vertex(corners[0]);
         corners[1..].windows(2).filter_map(move |pair| {

@@ -68,7 +68,10 @@ impl Gate {
         if misses.len() > NAMED_MISSES {
             lines.push(format!("set: {} more misses", misses.len() - NAMED_MISSES));
         }
-        let images = [("image", self.image.differences()), ("device image", self.device_image.differences())];
+        let images = [
+            ("image", self.image.differences()),
+            ("device image", self.device_image.differences()),
+        ];
         for (check, differences) in images {
             if let Some(first) = differences.first() {
                 let [x, y] = first.first_pixel;

@@ -11,8 +11,13 @@ use crate::scene::generate::{CameraMode, Knobs};
 
 /// A test bench for visibility culling: nothing in plain sight may be culled.
 #[derive(Parser)]
-#[command(name = "plainsight", version, about, after_help = "Exit codes: 0 all held, 1 a check \
-failed, 2 bad usage or input, 3 a device was lost or missing where one was required.")]
+#[command(
+    name = "plainsight",
+    version,
+    about,
+    after_help = "Exit codes: 0 all held, 1 a check \
+failed, 2 bad usage or input, 3 a device was lost or missing where one was required."
+)]
 pub(super) struct Cli {
     #[command(subcommand)]
     pub(super) verb: Option<Verb>,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use plainsight_reference::Image;
 
 use super::args::{Layer, PictureArgs};
-use super::run::{Oracles, Plan, catch_interrupt, pick_cullers, pick_index, progress_bar};
+use super::run::{catch_interrupt, one_lane, progress_bar};
 use super::{CliError, EXIT_HELD, OutFile, Streams};
 use crate::cull::CullerKind;
 use crate::part::PartId;
@@ -28,7 +28,8 @@ pub(super) fn picture(
     };
     let stem = PathBuf::from(&args.scene);
     let stem = stem.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let path = args.out.clone().unwrap_or_else(|| format!("{stem}-{}-{layer}.png", args.frame).into());
+    let path =
+        args.out.clone().unwrap_or_else(|| format!("{stem}-{}-{layer}.png", args.frame).into());
     let out = OutFile::create(&path)?;
     let mut scene_args = args.scene_args.clone();
     // A culler's history reaches back, so the frames before are run as well; the truth needs none.
@@ -36,15 +37,10 @@ pub(super) fn picture(
     if scene_args.frames.is_none_or(|frames| frames <= args.frame) {
         scene_args.frames = Some(args.frame.saturating_add(1).max(24));
     }
-    let adapter = args.scene_args.adapter.as_deref();
-    let plan = Plan {
-        cullers: pick_cullers(std::slice::from_ref(&args.culler), cullers)?,
-        index: pick_index(&args.scene_args.index)?,
-        oracles: Oracles::open(std::slice::from_ref(&args.oracle), adapter, streams)?,
-        args: &scene_args,
-    };
+    let lane = (args.scene.as_str(), &args.culler, &args.oracle);
+    let (plan, named) = one_lane(lane, &scene_args, cullers, streams)?;
     catch_interrupt();
-    let world = super::run::open_world(&args.scene, &scene_args)?;
+    let world = named.world(&scene_args);
     let state = FrameState::at(&world, args.frame);
     let truth = Truth::of(&world, &state);
     let drawn: Vec<PartId> = if needs_culler {

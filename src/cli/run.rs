@@ -15,13 +15,18 @@ use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
 use crate::oracle::{Always, Oracle, OracleError, Sim, Stage};
 use crate::part::{PartId, PartitionKnobs};
 use crate::report::{Row, table};
-use crate::run::{FrameRecord, Lane, LaneInfo, Observer, Trace, World, partition_difference, run as run_lanes};
-use crate::scene::generate;
+use crate::run::{
+    FrameRecord, Lane, LaneInfo, Observer, Trace, World, partition_difference, run as run_lanes,
+};
+use crate::scene::{Scene, generate};
 
 /// Frames that are run a second time to see that they repeat.
-const REPEATED_FRAMES: u32 = 2;
+const REPEATED_FRAMES: u32 = 1;
 /// The scenes of the default run.
 const DEFAULT_SCENES: [&str; 4] = ["bunnies", "city", "rooms", "soup"];
+/// Frames of the default run: 24 at full size take over three minutes on two cores, and the default
+/// is to answer within one. Naming a scene or `--frames` lifts the cut.
+const DEFAULT_RUN_FRAMES: u32 = 4;
 /// How many of the cullers the default run takes.
 const DEFAULT_CULLERS: usize = 3;
 
@@ -35,20 +40,24 @@ pub(super) struct Oracles {
 }
 
 impl Oracles {
+    /// Whether every name is one of an oracle.
+    fn known(names: &[String]) -> Result<(), CliError> {
+        let known = |name: &&String| ["sim", "hardware", "always"].contains(&name.as_str());
+        names.iter().find(|name| !known(name)).map_or(Ok(()), |name| {
+            let what = format!("no oracle is called '{name}'; there are sim, hardware, always");
+            Err(CliError::Usage(what))
+        })
+    }
+
     /// Opens what the names need. Without names: `sim`, and `hardware` where there is a device.
     pub(super) fn open(
         names: &[String],
         adapter: Option<&str>,
         streams: &mut Streams<'_>,
     ) -> Result<Self, CliError> {
-        for name in names {
-            if !["sim", "hardware", "always"].contains(&name.as_str()) {
-                let what = format!("no oracle is called '{name}'; there are sim, hardware, always");
-                return Err(CliError::Usage(what));
-            }
-        }
         let wanted = names.is_empty() || names.iter().any(|name| name == "hardware");
-        let found = if wanted { Gpu::open(adapter) } else { Err(OracleError::NoDevice(String::new())) };
+        let found =
+            if wanted { Gpu::open(adapter) } else { Err(OracleError::NoDevice(String::new())) };
         let asked_for = !names.is_empty() || adapter.is_some();
         let mut names = if names.is_empty() {
             vec!["sim".to_owned(), "hardware".to_owned()]
@@ -61,7 +70,10 @@ impl Oracles {
             Err(error) => {
                 if wanted {
                     writeln!(streams.talk, "WARNING: {error}")?;
-                    writeln!(streams.talk, "WARNING: no hardware queries are judged; the simulated device runs alone")?;
+                    writeln!(
+                        streams.talk,
+                        "WARNING: no hardware queries are judged; the simulated device runs alone"
+                    )?;
                 }
                 names.retain(|name| name != "hardware");
                 Ok(Self { names, gpu: None })
@@ -123,10 +135,23 @@ pub(super) fn pick_index(name: &str) -> Result<IndexKind, CliError> {
     })
 }
 
-/// The scene of that name or file, cut into parts.
-pub(super) fn open_world(name: &str, args: &SceneArgs) -> Result<World, CliError> {
-    let scene = generate::open(name, &args.knobs())?;
-    Ok(World::new(scene, PartitionKnobs { leaf_triangles: args.leaf }))
+/// A scene as the user named it. All are opened before any device, so that bad input is the first and
+/// only thing said.
+pub(super) struct Named {
+    name: String,
+    scene: Scene,
+}
+
+impl Named {
+    /// The scene of that name or file.
+    pub(super) fn open(name: &str, args: &SceneArgs) -> Result<Self, CliError> {
+        Ok(Self { name: name.to_owned(), scene: generate::open(name, &args.knobs())? })
+    }
+
+    /// The scene cut into parts.
+    pub(super) fn world(&self, args: &SceneArgs) -> World {
+        World::new(self.scene.clone(), PartitionKnobs { leaf_triangles: args.leaf })
+    }
 }
 
 /// One scene's lanes, run.
@@ -155,9 +180,10 @@ pub(super) struct Plan<'a> {
 
 impl Plan<'_> {
     /// Runs every lane of one scene.
-    pub(super) fn run(&self, name: &str, bar: &ProgressBar) -> Result<Finished, CliError> {
+    pub(super) fn run(&self, named: &Named, bar: &ProgressBar) -> Result<Finished, CliError> {
+        let name = &named.name;
         bar.set_message(format!("{name}: building"));
-        let world = open_world(name, self.args)?;
+        let world = named.world(self.args);
         let frames = world.scene.frames;
         let stage = Stage { partition: world.partition.clone(), viewport: world.scene.viewport };
         let staged = self.oracles.stage(&stage)?;
@@ -182,7 +208,7 @@ impl Plan<'_> {
             let culler = self.factory(kind, &world, &entries);
             running.push(Lane { info, culler, oracle, observer: gate });
         }
-        bar.set_message(name.to_owned());
+        bar.set_message(name.clone());
         let mut tick = || {
             bar.inc(1);
             !INTERRUPTED.load(Ordering::Relaxed)
@@ -271,22 +297,32 @@ pub(super) fn run(
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
     let out = args.out.as_deref().map(OutFile::create).transpose()?;
-    let plan = Plan {
-        cullers: pick_cullers(&args.culler, cullers)?,
-        index: pick_index(&args.scene_args.index)?,
-        oracles: Oracles::open(&args.oracle, args.scene_args.adapter.as_deref(), streams)?,
-        args: &args.scene_args,
-    };
-    let scenes: Vec<String> = if args.scene.is_empty() {
-        DEFAULT_SCENES.map(str::to_owned).to_vec()
+    let names: Vec<&str> = if args.scene.is_empty() {
+        DEFAULT_SCENES.to_vec()
     } else {
-        args.scene.clone()
+        args.scene.iter().map(String::as_str).collect()
+    };
+    let mut scene_args = args.scene_args.clone();
+    if args.scene.is_empty() {
+        scene_args.frames = scene_args.frames.or(Some(DEFAULT_RUN_FRAMES));
+    }
+    let open = |name: &&str| Named::open(name, &scene_args);
+    let (chosen, index) =
+        (pick_cullers(&args.culler, cullers)?, pick_index(&args.scene_args.index)?);
+    Oracles::known(&args.oracle)?;
+    let scenes = names.iter().map(open).collect::<Result<Vec<Named>, CliError>>()?;
+    let adapter = args.scene_args.adapter.as_deref();
+    let plan = Plan {
+        cullers: chosen,
+        index,
+        oracles: Oracles::open(&args.oracle, adapter, streams)?,
+        args: &scene_args,
     };
     catch_interrupt();
     let bar = progress_bar();
     let (mut rows, mut lines, mut failed) = (Vec::new(), String::new(), false);
-    for name in &scenes {
-        let finished = plan.run(name, &bar);
+    for named in &scenes {
+        let finished = plan.run(named, &bar);
         if finished.is_err() {
             bar.finish_and_clear();
         }
@@ -306,7 +342,8 @@ pub(super) fn run(
     }
     bar.finish_and_clear();
     if !args.json {
-        tell_table(&rows, streams)?;
+        let cut = args.scene.is_empty() && args.scene_args.frames.is_none();
+        tell_table(&rows, cut, streams)?;
     }
     if let Some(out) = out {
         out.finish(lines.as_bytes())?;
@@ -314,7 +351,7 @@ pub(super) fn run(
     Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
 }
 
-fn tell_table(rows: &[Row], streams: &mut Streams<'_>) -> Result<(), CliError> {
+fn tell_table(rows: &[Row], cut: bool, streams: &mut Streams<'_>) -> Result<(), CliError> {
     write!(streams.out, "{}", table(rows))?;
     let mut said = Vec::new();
     for row in rows {
@@ -323,7 +360,13 @@ fn tell_table(rows: &[Row], streams: &mut Streams<'_>) -> Result<(), CliError> {
             writeln!(
                 streams.out,
                 "{}: seed {}, {} frames, {} objects, {} triangles cut into {} in {} parts ({} pixels differ from the uncut scene)",
-                row.scene, row.seed, row.frames, row.objects, row.triangles, row.fragments, row.parts,
+                row.scene,
+                row.seed,
+                row.frames,
+                row.objects,
+                row.triangles,
+                row.fragments,
+                row.parts,
                 row.partition_difference_pixels
             )?;
         }
@@ -331,9 +374,19 @@ fn tell_table(rows: &[Row], streams: &mut Streams<'_>) -> Result<(), CliError> {
     if let Some(device) = rows.iter().find_map(|row| row.device.as_ref()) {
         writeln!(streams.out, "hardware: {device}")?;
     }
+    if cut {
+        writeln!(
+            streams.out,
+            "frames: cut to {DEFAULT_RUN_FRAMES} of 24 to answer within a minute; --frames 24 runs them all"
+        )?;
+    }
     let held = rows.iter().filter(|row| row.verdict == "held").count();
     let word = if held == rows.len() { "held" } else { "FAILED" };
-    writeln!(streams.out, "verdict: {word} ({held} of {} lanes held; figures per frame)", rows.len())?;
+    writeln!(
+        streams.out,
+        "verdict: {word} ({held} of {} lanes held; figures per frame)",
+        rows.len()
+    )?;
     Ok(())
 }
 
@@ -348,21 +401,32 @@ fn tell_failures(gate: &Gate, trace: &Trace, streams: &mut Streams<'_>) -> std::
     Ok(())
 }
 
+/// The plan for one culler and one oracle on one scene.
+pub(super) fn one_lane<'a>(
+    (scene, culler, oracle): (&str, &String, &String),
+    args: &'a SceneArgs,
+    cullers: &[CullerKind],
+    streams: &mut Streams<'_>,
+) -> Result<(Plan<'a>, Named), CliError> {
+    let oracle = std::slice::from_ref(oracle);
+    let chosen = pick_cullers(std::slice::from_ref(culler), cullers)?;
+    let index = pick_index(&args.index)?;
+    Oracles::known(oracle)?;
+    let named = Named::open(scene, args)?;
+    let oracles = Oracles::open(oracle, args.adapter.as_deref(), streams)?;
+    Ok((Plan { cullers: chosen, index, oracles, args }, named))
+}
+
 pub(super) fn replay(
     args: &ReplayArgs,
     cullers: &[CullerKind],
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
-    let adapter = args.scene_args.adapter.as_deref();
-    let plan = Plan {
-        cullers: pick_cullers(std::slice::from_ref(&args.culler), cullers)?,
-        index: pick_index(&args.scene_args.index)?,
-        oracles: Oracles::open(std::slice::from_ref(&args.oracle), adapter, streams)?,
-        args: &args.scene_args,
-    };
+    let (plan, named) =
+        one_lane((&args.scene, &args.culler, &args.oracle), &args.scene_args, cullers, streams)?;
     catch_interrupt();
     let bar = progress_bar();
-    let finished = plan.run(&args.scene, &bar);
+    let finished = plan.run(&named, &bar);
     bar.finish_and_clear();
     let finished = finished?;
     let (trace, gate) = (&finished.traces[0], &finished.gates[0]);
@@ -386,8 +450,13 @@ pub(super) fn replay(
             writeln!(
                 streams.out,
                 "frame {:>4}: drew {:>5}, visible {:>5}, {:>5} queries, {:>4} trips, {:>7.1} ms, events {:016x}",
-                frame.frame, frame.drawn_parts, frame.visible_parts, frame.counts.queries,
-                frame.counts.round_trips, frame.wall_ns as f64 / 1e6, frame.events_hash
+                frame.frame,
+                frame.drawn_parts,
+                frame.visible_parts,
+                frame.counts.queries,
+                frame.counts.round_trips,
+                frame.wall_ns as f64 / 1e6,
+                frame.events_hash
             )?;
         }
     }
@@ -395,11 +464,18 @@ pub(super) fn replay(
     tell_failures(gate, trace, streams)?;
     let mut held = gate.held();
     if let Some(expected) = args.expect.as_ref().filter(|expected| **expected != hash) {
-        writeln!(streams.talk, "trace hash {hash} is not the expected {expected}: another build, device or scene")?;
+        writeln!(
+            streams.talk,
+            "trace hash {hash} is not the expected {expected}: another build, device or scene"
+        )?;
         held = false;
     }
     if !args.json {
-        writeln!(streams.out, "trace hash {hash}, verdict: {}", if held { "held" } else { "FAILED" })?;
+        writeln!(
+            streams.out,
+            "trace hash {hash}, verdict: {}",
+            if held { "held" } else { "FAILED" }
+        )?;
     }
     Ok(if held { EXIT_HELD } else { EXIT_FAILED })
 }

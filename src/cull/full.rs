@@ -164,12 +164,15 @@ impl Full {
             let free = asked < self.knobs.most_in_flight
                 && !taken.iter().any(|other| other.overlaps(&rectangle));
             taken.push(rectangle);
-            kept.push((item, if free {
-                asked += 1;
-                State::Asked(pen.ask(&proxy))
-            } else {
-                State::Waiting(rectangle, proxy)
-            }));
+            kept.push((
+                item,
+                if free {
+                    asked += 1;
+                    State::Asked(pen.ask(&proxy))
+                } else {
+                    State::Waiting(rectangle, proxy)
+                },
+            ));
         }
         (kept, asked > 0)
     }

@@ -91,7 +91,8 @@ impl<'a> Pen<'a> {
     /// FNV-1a over whole words.
     fn note(&mut self, kind: u64, value: u64) {
         for word in [kind, value] {
-            self.events_hash = (self.events_hash ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
+            self.events_hash =
+                (self.events_hash ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
         }
     }
 }

@@ -79,10 +79,14 @@ impl Scenery {
         // Children have larger numbers than parents, so one pass from the back reaches the root.
         for number in (0..self.index.node_count()).rev() {
             let node = NodeId(number);
-            let own = self.index.node(node).objects.iter().fold(
-                self.node_error[number as usize],
-                |error, object| error.max(&view.objects[object.0 as usize].error),
-            );
+            let own = self
+                .index
+                .node(node)
+                .objects
+                .iter()
+                .fold(self.node_error[number as usize], |error, object| {
+                    error.max(&view.objects[object.0 as usize].error)
+                });
             self.node_error[number as usize] = own;
             if let Some(parent) = self.index.parent(node) {
                 let slot = &mut self.node_error[parent.0 as usize];
@@ -161,7 +165,13 @@ impl Scenery {
     /// Algorithm 4, `ProcessVisibleNode`: draws what the node holds itself and appends what is to be
     /// looked at next, front to back: the nearer child, the objects with trees sorted by the distance
     /// of their boxes' centres, the farther child.
-    pub(super) fn expand(&self, view: &View<'_>, item: Item, pen: &mut Pen<'_>, out: &mut Vec<Item>) {
+    pub(super) fn expand(
+        &self,
+        view: &View<'_>,
+        item: Item,
+        pen: &mut Pen<'_>,
+        out: &mut Vec<Item>,
+    ) {
         match item {
             Item::Scene(node) => self.expand_scene(view, node, pen, out),
             Item::Object(object, node) => self.expand_object(view, object, node, pen, out),

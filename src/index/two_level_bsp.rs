@@ -76,7 +76,9 @@ impl TwoLevelBsp {
             objects: Vec::new(),
             subtree_objects: 0,
         });
-        if inside.len() > LEAF_OBJECTS && let Some((axis, at)) = self.choose(inside) {
+        if inside.len() > LEAF_OBJECTS
+            && let Some((axis, at)) = self.choose(inside)
+        {
             let pick = |keep: &dyn Fn(&Aabb) -> bool| -> Vec<u32> {
                 inside.iter().copied().filter(|&o| keep(&self.bounds[o as usize])).collect()
             };
@@ -85,8 +87,10 @@ impl TwoLevelBsp {
             let (mut low_space, mut high_space) = (space, space);
             low_space.max[axis] = at;
             high_space.min[axis] = at;
-            let children =
-                [self.build(low_space, Some(node), &low), self.build(high_space, Some(node), &high)];
+            let children = [
+                self.build(low_space, Some(node), &low),
+                self.build(high_space, Some(node), &high),
+            ];
             let this = &mut self.nodes[node.0 as usize];
             this.plane = (axis, at);
             this.children = Some(children);
@@ -219,7 +223,12 @@ impl Index for TwoLevelBsp {
         let mut seen = vec![0_u32; self.bounds.len()];
         let mut escaped = 0;
         for (number, node) in self.nodes.iter().enumerate() {
-            let below: u32 = node.children.iter().flatten().map(|c| self.nodes[c.0 as usize].subtree_objects).sum();
+            let below: u32 = node
+                .children
+                .iter()
+                .flatten()
+                .map(|c| self.nodes[c.0 as usize].subtree_objects)
+                .sum();
             if node.subtree_objects != below + node.objects.len() as u32 {
                 return Err(format!("node {number} counts {} objects", node.subtree_objects));
             }

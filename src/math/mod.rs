@@ -8,7 +8,9 @@ mod inflate;
 mod trig;
 
 pub use aabb::{Aabb, TRANSFORM_MARGIN};
-pub use clip_box::{ClipBox, DEPTH_ROUNDING, PixelRectangle, Projection, RECTANGLE_DILATION_PIXELS};
+pub use clip_box::{
+    ClipBox, DEPTH_ROUNDING, PixelRectangle, Projection, RECTANGLE_DILATION_PIXELS,
+};
 pub use clip_error::{CLIP_ERROR_GAMMA, ClipError, rounded_clip_matrix};
 pub use inflate::{BOX_DEPTH_SLACK, inflated_box};
 pub use trig::{cos, sin, tan};

@@ -24,7 +24,6 @@ pub use always::Always;
 use proxy_mesh::box_proxy_triangles;
 pub use sim::{Sim, part_draw};
 
-
 /// What an oracle is told at the start of a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameView<'a> {

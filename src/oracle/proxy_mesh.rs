@@ -2,7 +2,8 @@
 
 /// The twelve triangles of a box; corner bit 0 is x, bit 1 y, bit 2 z.
 pub(super) fn box_triangles(min: [f32; 3], max: [f32; 3]) -> ([[f32; 3]; 8], [[u32; 3]; 12]) {
-    let corner = |i: usize| std::array::from_fn(|axis| if i >> axis & 1 == 0 { min } else { max }[axis]);
+    let corner =
+        |i: usize| std::array::from_fn(|axis| if i >> axis & 1 == 0 { min } else { max }[axis]);
     let faces: [[u32; 4]; 6] =
         [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
     let triangle = |i: usize| {

@@ -246,13 +246,7 @@ impl PartedMesh {
 
 /// Appends the point of the edge at the plane: exact on the axis, elsewhere interpolated in f64 from
 /// the lower end and rounded once.
-fn cut_edge(
-    positions: &mut Vec<[f32; 3]>,
-    lower: u32,
-    upper: u32,
-    axis: usize,
-    at: f32,
-) -> u32 {
+fn cut_edge(positions: &mut Vec<[f32; 3]>, lower: u32, upper: u32, axis: usize, at: f32) -> u32 {
     let (a, b) = (positions[lower as usize], positions[upper as usize]);
     let (a, b) = (a.map(f64::from), b.map(f64::from));
     let along = (f64::from(at) - a[axis]) / (b[axis] - a[axis]);

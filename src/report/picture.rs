@@ -85,7 +85,9 @@ pub fn top_view(world: &World, state: &FrameState, shown: &Shown<'_>, side: u32)
             continue;
         }
         let ((x0, y0), (x1, y1)) = (place(bounds.min), place(bounds.max));
-        let Some(rect) = Rect::from_ltrb(x0, y0, x1.max(x0 + 1.0), y1.max(y0 + 1.0)) else { continue };
+        let Some(rect) = Rect::from_ltrb(x0, y0, x1.max(x0 + 1.0), y1.max(y0 + 1.0)) else {
+            continue;
+        };
         let [r, g, b] = FATES[fate];
         let mut paint = Paint::default();
         paint.set_color_rgba8(r, g, b, 90);

@@ -60,7 +60,12 @@ pub struct Row {
 impl Row {
     /// Gathers one lane.
     #[must_use]
-    pub fn new(world: &World, trace: &Trace, gate: &Gate, partition_difference_pixels: u64) -> Self {
+    pub fn new(
+        world: &World,
+        trace: &Trace,
+        gate: &Gate,
+        partition_difference_pixels: u64,
+    ) -> Self {
         let counts = gate.counts.total();
         Self {
             schema: JSON_SCHEMA,
@@ -107,7 +112,8 @@ impl Row {
 /// The rows as a table, figures per frame.
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
-    let head = ["scene", "culler", "oracle", "drawn", "visible", "queries", "trips", "ms", "verdict"];
+    let head =
+        ["scene", "culler", "oracle", "drawn", "visible", "queries", "trips", "ms", "verdict"];
     let mut lines = vec![head.map(str::to_owned)];
     lines.extend(rows.iter().map(Row::cells));
     let width = |column: usize| lines.iter().map(|cells| cells[column].len()).max().unwrap_or(0);

@@ -3,7 +3,9 @@
 
 use std::time::Instant;
 
-use super::{DeviceImages, FrameRecord, FrameState, FrameTrace, HASH_START, Trace, Truth, World, fold};
+use super::{
+    DeviceImages, FrameRecord, FrameState, FrameTrace, HASH_START, Trace, Truth, World, fold,
+};
 use crate::cull::{Counts, Culler, Pen};
 use crate::oracle::{FrameView, Oracle, OracleError, ReadBack};
 use crate::part::PartId;

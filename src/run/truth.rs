@@ -55,8 +55,7 @@ pub fn render(world: &World, state: &FrameState, parts: &[PartId], image: &mut I
 /// one: what the T-junctions along the cuts cost.
 #[must_use]
 pub fn partition_difference(world: &World) -> u64 {
-    let uncut =
-        World::new((*world.scene).clone(), PartitionKnobs { leaf_triangles: u32::MAX });
+    let uncut = World::new((*world.scene).clone(), PartitionKnobs { leaf_triangles: u32::MAX });
     let sources = |world: &World| {
         let truth = Truth::of(world, &FrameState::at(world, 0));
         (0..truth.image.samples().len())

@@ -84,8 +84,7 @@ impl CameraPath {
         let duration = self.duration.max(1);
         let phase = t % (2 * duration);
         let folded = if phase <= duration { phase } else { 2 * duration - phase };
-        let along =
-            f64::from(folded) / f64::from(duration) * (self.poses.len() - 1) as f64;
+        let along = f64::from(folded) / f64::from(duration) * (self.poses.len() - 1) as f64;
         let from = (along as usize).min(self.poses.len() - 1);
         let to = (from + 1).min(self.poses.len() - 1);
         let part = along - from as f64;

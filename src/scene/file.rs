@@ -18,8 +18,8 @@ use serde::Deserialize;
 
 use super::generate::{self, CameraMode, Knobs};
 use super::{
-    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path as Way, Placement, Scene, SceneError,
-    Viewport,
+    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path as Way, Placement, Scene,
+    SceneError, Viewport,
 };
 
 /// The only version there is.
@@ -121,9 +121,7 @@ pub fn load(path: &Path, knobs: &Knobs) -> Result<Scene, SceneError> {
         (Some(_), false) => {
             Err(refuse("has a generator and objects; keep one of the two".to_owned()))
         }
-        (None, true) => {
-            Err(refuse("has neither a generator nor [[objects]]; add one".to_owned()))
-        }
+        (None, true) => Err(refuse("has neither a generator nor [[objects]]; add one".to_owned())),
     }
 }
 
@@ -132,7 +130,8 @@ fn one_line(text: &str, error: &toml::de::Error) -> String {
     let message = error.message().replace('\n', " ");
     match error.span() {
         Some(span) => {
-            let line = text.as_bytes()[..span.start.min(text.len())].iter().filter(|&&b| b == b'\n');
+            let line =
+                text.as_bytes()[..span.start.min(text.len())].iter().filter(|&&b| b == b'\n');
             format!("line {}: {message}", line.count() + 1)
         }
         None => message,
@@ -159,7 +158,9 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
         };
         objects.push(Object { mesh: number as u32, placement });
         if let Some(InlineReflect { velocity, min, max, spin }) = object.reflect {
-            if !([velocity, min, max].as_flattened().iter().all(|c| c.is_finite()) && spin.is_finite()) {
+            if !([velocity, min, max].as_flattened().iter().all(|c| c.is_finite())
+                && spin.is_finite())
+            {
                 return Err(format!("object {number}: its motion must be finite"));
             }
             let way =

@@ -52,7 +52,10 @@ fn scan(text: &str) -> Result<(), String> {
                 for word in words.take(3) {
                     let finite = word.parse::<f32>().is_ok_and(f32::is_finite);
                     if !finite {
-                        return Err(format!("line {number}: '{}' is no finite number", short(word)));
+                        return Err(format!(
+                            "line {number}: '{}' is no finite number",
+                            short(word)
+                        ));
                     }
                     coordinates += 1;
                 }
@@ -123,7 +126,8 @@ mod tests {
 
     #[test]
     fn groups_become_meshes_and_polygons_triangles() {
-        let meshes = import("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\ng a\nf 1 2 3 4\ng b\nf -1 -2 -3\n");
+        let meshes =
+            import("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\ng a\nf 1 2 3 4\ng b\nf -1 -2 -3\n");
         let meshes = meshes.unwrap();
         let counts: Vec<usize> = meshes.iter().map(|m| m.triangles().len()).collect();
         assert_eq!(counts, [2, 1]);

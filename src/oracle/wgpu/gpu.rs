@@ -45,8 +45,7 @@ impl Gpu {
     /// [`OracleError::NoDevice`] where none fits; the message names those that were found.
     pub fn open(adapter: Option<&str>) -> Result<Arc<Self>, OracleError> {
         let found = all_adapters();
-        let is_cpu =
-            |a: &&wgpu::Adapter| a.get_info().device_type == wgpu::DeviceType::Cpu;
+        let is_cpu = |a: &&wgpu::Adapter| a.get_info().device_type == wgpu::DeviceType::Cpu;
         let chosen = match adapter {
             Some(name) => {
                 let wanted = name.to_lowercase();

@@ -22,7 +22,10 @@ const RESULT_BYTES: u64 = 8;
 enum Event {
     Draw(PartId),
     /// A question with its run of proxy vertices.
-    Ask { first_vertex: u32, end_vertex: u32 },
+    Ask {
+        first_vertex: u32,
+        end_vertex: u32,
+    },
 }
 
 /// What a batch needs on the device, kept for the next one.
@@ -108,7 +111,12 @@ impl Hardware {
         let vertices = size_of_val(self.proxy_vertices.as_slice()) as u64;
         let buffer = |size: u64, usage| {
             let size = size.next_power_of_two();
-            device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: None,
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
         };
         let results = |size| {
             (
@@ -220,7 +228,12 @@ impl Hardware {
         let device = &self.stage.gpu.device;
         let size = (size_of_val(picked.as_slice()) as u64).max(16);
         let usage = wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST;
-        let indices = device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false });
+        let indices = device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size,
+            usage,
+            mapped_at_creation: false,
+        });
         self.stage.gpu.queue.write_buffer(&indices, 0, bytemuck::cast_slice(&picked));
         let ids = images.ids_view().map(|view| wgpu::RenderPassColorAttachment {
             view,
@@ -338,7 +351,12 @@ impl Oracle for Hardware {
             for set in 0..sets {
                 let count = (self.open.len() - set * QUERIES_PER_PASS).min(QUERIES_PER_PASS);
                 let offset = (set * QUERIES_PER_PASS) as u64 * RESULT_BYTES;
-                encoder.resolve_query_set(&slot.queries[set], 0..count as u32, &slot.resolved, offset);
+                encoder.resolve_query_set(
+                    &slot.queries[set],
+                    0..count as u32,
+                    &slot.resolved,
+                    offset,
+                );
             }
             encoder.copy_buffer_to_buffer(&slot.resolved, 0, &slot.staging, 0, bytes);
         }

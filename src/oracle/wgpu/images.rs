@@ -28,7 +28,8 @@ impl Images {
                 view_formats: &[],
             })
         };
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let view =
+            |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let depth = texture(DEPTH);
         let ids = with_ids.then(|| texture(IDS)).map(|ids| {
             let view = view(&ids);

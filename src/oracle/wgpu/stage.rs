@@ -111,7 +111,8 @@ fn upload(device: &wgpu::Device, mesh: &PartedMesh) -> GpuMesh {
         let run = part.first_vertex as usize..(part.first_vertex + part.vertex_count) as usize;
         let of = |&position: &[f32; 3]| Vertex { position, part: number as u32 };
         vertices.extend(mesh.positions[run].iter().map(of));
-        let run = part.first_triangle as usize..(part.first_triangle + part.triangle_count) as usize;
+        let run =
+            part.first_triangle as usize..(part.first_triangle + part.triangle_count) as usize;
         let from_first = |t: &[u32; 3]| t.map(|corner| corner + part.first_vertex);
         absolute.extend(mesh.triangles[run].iter().map(from_first));
     }

@@ -33,7 +33,11 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
     let mut objects = Vec::new();
     let mut movers = Vec::new();
     let point = |stream: &mut Stream, reach: f64| {
-        DVec3::new(stream.range(-reach, reach), stream.range(-reach, reach), stream.range(-reach, reach))
+        DVec3::new(
+            stream.range(-reach, reach),
+            stream.range(-reach, reach),
+            stream.range(-reach, reach),
+        )
     };
     for object in 0..count {
         let placement = Placement {
@@ -61,7 +65,13 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         seed: chosen.seed,
         meshes,
         objects,
-        camera: CameraPath { poses, duration: chosen.frames, fov_y: 1.0, near: 0.1, far: 8.0 * side + 20.0 },
+        camera: CameraPath {
+            poses,
+            duration: chosen.frames,
+            fov_y: 1.0,
+            near: 0.1,
+            far: 8.0 * side + 20.0,
+        },
         viewport: chosen.viewport,
         frames: chosen.frames,
         effects: Effects { motion: Some(Motion { movers }) },

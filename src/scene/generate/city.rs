@@ -8,7 +8,8 @@ use glam::DVec3;
 use super::Chosen;
 use super::shape::Builder;
 use crate::scene::{
-    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path, Placement, Scene, SceneError, Stream,
+    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path, Placement, Scene, SceneError,
+    Stream,
 };
 
 /// Blocks along a side at scale 1.

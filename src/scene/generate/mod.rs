@@ -171,9 +171,7 @@ mod tests {
 
     #[test]
     fn knobs_out_of_range_are_refused() {
-        let refused = |knobs: Knobs| {
-            matches!(build("soup", &knobs), Err(SceneError::Knob { .. }))
-        };
+        let refused = |knobs: Knobs| matches!(build("soup", &knobs), Err(SceneError::Knob { .. }));
         assert!(refused(Knobs { frames: Some(0), ..Knobs::default() }));
         assert!(refused(Knobs { scale: Some(f64::NAN), ..Knobs::default() }));
         assert!(refused(Knobs { scale: Some(0.0), ..Knobs::default() }));

@@ -7,9 +7,7 @@ use glam::DVec3;
 
 use super::{CameraMode, Chosen};
 use crate::math::{Aabb, cos, sin};
-use crate::scene::{
-    CameraPath, CameraPose, Effects, Object, Placement, Scene, SceneError, import,
-};
+use crate::scene::{CameraPath, CameraPose, Effects, Object, Placement, Scene, SceneError, import};
 
 /// Poses of the camera round a model.
 const POSES: u32 = 16;

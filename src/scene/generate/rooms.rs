@@ -8,7 +8,8 @@ use glam::{DQuat, DVec3};
 use super::Chosen;
 use super::shape::Builder;
 use crate::scene::{
-    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path, Placement, Scene, SceneError, Stream,
+    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path, Placement, Scene, SceneError,
+    Stream,
 };
 
 /// Rooms along a side at scale 1.
@@ -31,9 +32,10 @@ const STATUE: u32 = 5;
 
 pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
     let rooms = (ROOMS * chosen.scale.sqrt()).round().max(1.0) as u32;
-    let meshes = [floor(), wall(false), wall(true), table(), shelf(), super::blob(12_000, chosen.seed)]
-        .map(Arc::new)
-        .to_vec();
+    let meshes =
+        [floor(), wall(false), wall(true), table(), shelf(), super::blob(12_000, chosen.seed)]
+            .map(Arc::new)
+            .to_vec();
     let mut place = Stream::new(chosen.seed, "placement");
     let mut motion = Stream::new(chosen.seed, "motion");
     let (mut objects, mut movers) = (Vec::new(), Vec::new());
@@ -54,7 +56,9 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         let corner = DVec3::new(f64::from(room % rooms), 0.0, f64::from(room / rooms)) * SIDE;
         put(FLOOR, corner, DQuat::IDENTITY, DVec3::ONE);
         put(FLOOR, corner + DVec3::Y * HEIGHT, DQuat::IDENTITY, DVec3::ONE);
-        for (mesh, x, z) in [(TABLE, 1.5, 4.5), (SHELF, 4.6, 0.4), (SHELF, 0.4, 1.0), (STATUE, 4.7, 4.7)] {
+        for (mesh, x, z) in
+            [(TABLE, 1.5, 4.5), (SHELF, 4.6, 0.4), (SHELF, 0.4, 1.0), (STATUE, 4.7, 4.7)]
+        {
             let jitter = DVec3::new(place.range(-0.2, 0.2), 0.0, place.range(-0.2, 0.2));
             let up = if mesh == STATUE { DVec3::Y } else { DVec3::ZERO };
             let turn = DQuat::from_rotation_y(place.range(-0.1, 0.1));
@@ -129,7 +133,12 @@ fn table() -> Mesh {
     let mut mesh = Builder::default();
     mesh.cuboid(DVec3::new(-0.8, 0.7, -0.5), DVec3::new(0.8, 0.75, 0.5), 0.06, 27);
     for (x, z) in [(-0.7, -0.4), (0.7, -0.4), (-0.7, 0.4), (0.7, 0.4)] {
-        mesh.cuboid(DVec3::new(x - 0.04, 0.0, z - 0.04), DVec3::new(x + 0.04, 0.7, z + 0.04), 0.05, 14);
+        mesh.cuboid(
+            DVec3::new(x - 0.04, 0.0, z - 0.04),
+            DVec3::new(x + 0.04, 0.7, z + 0.04),
+            0.05,
+            14,
+        );
     }
     mesh.finish("table")
 }

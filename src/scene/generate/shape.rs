@@ -33,7 +33,8 @@ impl Builder {
         let [columns, rows] = cells.map(|c| c.max(1));
         for row in 0..=rows {
             for column in 0..=columns {
-                let (u, v) = (f64::from(column) / f64::from(columns), f64::from(row) / f64::from(rows));
+                let (u, v) =
+                    (f64::from(column) / f64::from(columns), f64::from(row) / f64::from(rows));
                 let point = origin + across * u + up * v + lift(u, v);
                 self.positions.push(point.as_vec3().to_array());
             }

@@ -8,7 +8,8 @@ use glam::{DQuat, DVec3};
 use super::Chosen;
 use super::shape::Builder;
 use crate::scene::{
-    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path, Placement, Scene, SceneError, Stream,
+    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path, Placement, Scene, SceneError,
+    Stream,
 };
 
 /// Objects at scale 1.
@@ -40,21 +41,36 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         if place.below(8) == 0 {
             scale.x = -scale.x;
         }
-        objects.push(Object { mesh: place.below(designs), placement: Placement { translation, rotation, scale } });
+        objects.push(Object {
+            mesh: place.below(designs),
+            placement: Placement { translation, rotation, scale },
+        });
         if motion.below(2) == 0 {
             let velocity = within(&mut motion, 0.5);
             let (min, max) = (DVec3::splat(-SPACE), DVec3::splat(SPACE));
-            movers.push((object, Path::Reflect { velocity, min, max, spin: motion.range(-0.3, 0.3) }));
+            movers.push((
+                object,
+                Path::Reflect { velocity, min, max, spin: motion.range(-0.3, 0.3) },
+            ));
         }
     }
-    let pose = |x: f64, y: f64, z: f64| CameraPose { eye: DVec3::new(x, y, z) * SPACE, target: DVec3::ZERO };
+    let pose = |x: f64, y: f64, z: f64| CameraPose {
+        eye: DVec3::new(x, y, z) * SPACE,
+        target: DVec3::ZERO,
+    };
     let poses = vec![pose(1.8, 0.4, 0.3), pose(1.0, 0.9, 1.3), pose(0.2, 0.3, 0.9)];
     Ok(Scene {
         name: "soup".to_owned(),
         seed: chosen.seed,
         meshes,
         objects,
-        camera: CameraPath { poses, duration: chosen.frames, fov_y: 1.1, near: 0.05, far: SPACE * 8.0 },
+        camera: CameraPath {
+            poses,
+            duration: chosen.frames,
+            fov_y: 1.1,
+            near: 0.05,
+            far: SPACE * 8.0,
+        },
         viewport: chosen.viewport,
         frames: chosen.frames,
         effects: Effects { motion: Some(Motion { movers }) },
@@ -62,7 +78,11 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
 }
 
 fn within(stream: &mut Stream, reach: f64) -> DVec3 {
-    DVec3::new(stream.range(-reach, reach), stream.range(-reach, reach), stream.range(-reach, reach))
+    DVec3::new(
+        stream.range(-reach, reach),
+        stream.range(-reach, reach),
+        stream.range(-reach, reach),
+    )
 }
 
 /// Pieces within about unit distance; sizes over five decades, few of them large.
@@ -85,7 +105,8 @@ fn soup(shape: &mut Stream, pieces: u32) -> Mesh {
             _ => {
                 let half = DVec3::new(shape.unit(), shape.unit(), shape.unit()) * size;
                 // One box in ten is flat.
-                let half = if shape.below(10) == 0 { half * DVec3::new(1.0, 0.0, 1.0) } else { half };
+                let half =
+                    if shape.below(10) == 0 { half * DVec3::new(1.0, 0.0, 1.0) } else { half };
                 mesh.cuboid(at - half, at + half, f64::INFINITY, 1);
             }
         }

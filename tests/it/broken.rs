@@ -1,0 +1,83 @@
+//! A culler broken on purpose is caught: frame, part, pixel and replay line, exit 1.
+
+use plainsight::cli::{EXIT_FAILED, EXIT_HELD, Streams, main};
+use plainsight::cull::{Culler, CullerKind, CullerSetup, Pen, View};
+use plainsight::math::rounded_clip_matrix;
+use plainsight::oracle::{OracleError, part_draw};
+use plainsight::part::PartId;
+use plainsight_reference::{Image, fast};
+
+/// The frame in which it goes wrong.
+const BAD_FRAME: u32 = 7;
+
+/// Draws everything, but for one part that shows in the picture of frame 7.
+struct DropsOne;
+
+fn visible_part(view: &View<'_>) -> PartId {
+    let matrices: Vec<_> =
+        view.objects.iter().map(|o| rounded_clip_matrix(&o.clip_from_object)).collect();
+    let parts = (0..view.partition.part_count()).map(PartId);
+    let draws: Vec<_> = parts.map(|part| part_draw(view.partition, part, &matrices)).collect();
+    let mut image = Image::new(view.viewport);
+    fast::draw_all(&mut image, &draws);
+    let shown = (0..image.samples().len()).find_map(|sample| image.draw_index(sample));
+    view.partition.part_of_draw(shown.expect("something is visible"))
+}
+
+impl Culler for DropsOne {
+    fn name(&self) -> &str {
+        "drops-one"
+    }
+
+    fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
+        let dropped = (view.frame == BAD_FRAME).then(|| visible_part(view));
+        let parts = (0..view.partition.part_count()).map(PartId);
+        parts.filter(|&part| Some(part) != dropped).for_each(|part| pen.draw(part));
+        Ok(())
+    }
+}
+
+fn make(_: CullerSetup) -> Box<dyn Culler> {
+    Box::new(DropsOne)
+}
+
+const BROKEN: &[CullerKind] =
+    &[CullerKind { name: "drops-one", summary: "broken on purpose", asks: false, make }];
+
+fn run(line: &str) -> (u8, String, String) {
+    let (mut out, mut talk) = (Vec::new(), Vec::new());
+    let args = line.split(' ').map(Into::into);
+    let code = main(args, BROKEN, Streams { out: &mut out, talk: &mut talk });
+    (code, String::from_utf8(out).unwrap(), String::from_utf8(talk).unwrap())
+}
+
+const SCENE: &str = "--scene rooms --seed 2 --scale 0.02 --viewport 200x160 --leaf 256";
+
+#[test]
+fn a_dropped_part_is_caught_and_replays() {
+    for oracle in ["sim", "hardware"] {
+        let (code, out, talk) =
+            run(&format!("plainsight run {SCENE} --frames 9 --oracle {oracle} --culler drops-one"));
+        assert_eq!(code, EXIT_FAILED, "{out}{talk}");
+        assert!(out.contains("verdict: FAILED (0 of 1 lanes held"), "{out}");
+        assert!(talk.contains("set: frame 7 part "), "{talk}");
+        assert!(talk.contains("pixels, first at ("), "{talk}");
+        assert!(talk.contains("image: 1 frames differ, first frame 7 in "), "{talk}");
+        assert_eq!(
+            oracle == "hardware",
+            talk.contains("device image: 1 frames differ, first frame 7")
+        );
+        let replay = talk.lines().find_map(|line| line.trim().strip_prefix("replay: ")).unwrap();
+        let (code, out, talk) = run(replay);
+        assert_eq!(code, EXIT_FAILED, "{out}{talk}");
+        assert!(!talk.contains("is not the expected"), "{talk}");
+        assert!(talk.contains("set: frame 7 part "), "{talk}");
+    }
+}
+
+#[test]
+fn before_the_bad_frame_it_holds() {
+    let (code, out, talk) =
+        run(&format!("plainsight run {SCENE} --frames 7 --oracle sim --culler drops-one"));
+    assert_eq!(code, EXIT_HELD, "{out}{talk}");
+}

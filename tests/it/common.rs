@@ -1,0 +1,80 @@
+//! The shared runner: small worlds by name and seed, and the gate over any culler and oracle.
+
+use std::sync::{Arc, OnceLock};
+
+use plainsight::check::Gate;
+use plainsight::cull::{CullerKind, CullerSetup, ProxyKind};
+use plainsight::index::IndexKind;
+use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware};
+use plainsight::oracle::{Always, Oracle, Sim, Stage};
+use plainsight::part::PartitionKnobs;
+use plainsight::run::{Lane, LaneInfo, Trace, World, run};
+use plainsight::scene::Viewport;
+use plainsight::scene::generate::{Knobs, build};
+
+/// Scenes of the shared tests; `model` needs a file.
+pub const SCENES: [&str; 4] = ["bunnies", "city", "rooms", "soup"];
+/// Oracles of the shared tests.
+pub const ORACLES: [&str; 3] = ["sim", "hardware", "always"];
+
+/// The device, opened once. A test that needs one fails without it.
+pub fn gpu() -> &'static Arc<Gpu> {
+    static GPU: OnceLock<Arc<Gpu>> = OnceLock::new();
+    GPU.get_or_init(|| Gpu::open(None).unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// A world small enough for debug builds.
+pub fn world(scene: &str, seed: u64, scale: f64, frames: u32) -> World {
+    let knobs = Knobs {
+        seed: Some(seed),
+        scale: Some(scale),
+        frames: Some(frames),
+        viewport: Some(Viewport { width: 321, height: 243 }),
+        ..Knobs::default()
+    };
+    let scene = build(scene, &knobs).unwrap();
+    World::new(scene, PartitionKnobs { leaf_triangles: 256 })
+}
+
+/// An oracle by name.
+pub fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
+    let stage = Stage { partition: world.partition.clone(), viewport: world.scene.viewport };
+    match name {
+        "sim" => Box::new(Sim::new(stage)),
+        "always" => Box::<Always>::default(),
+        "hardware" => {
+            let stage = GpuStage::new(gpu(), &stage).unwrap();
+            Box::new(Hardware::new(&stage).unwrap())
+        }
+        _ => unreachable!("no oracle is called {name}"),
+    }
+}
+
+/// Runs one lane through the gate.
+pub fn gate(
+    world: &World,
+    culler: CullerKind,
+    index: IndexKind,
+    oracle_name: &str,
+    proxy: ProxyKind,
+) -> (Trace, Gate) {
+    let entries = world.entries();
+    let make = || {
+        (culler.make)(CullerSetup {
+            partition: world.partition.clone(),
+            index: (index.build)(&entries),
+            proxy,
+        })
+    };
+    let oracle = oracle(oracle_name, world);
+    let info = LaneInfo {
+        culler: culler.name.to_owned(),
+        oracle: oracle.name(),
+        device: oracle.device(),
+        replay: format!("scene {} seed {}", world.scene.name, world.scene.seed),
+    };
+    let mut gate = Gate::default();
+    let lane = Lane { info, culler: Box::new(make), oracle, observer: &mut gate };
+    let mut traces = run(world, world.scene.frames, 1, &mut [lane], &mut || true).unwrap();
+    (traces.pop().unwrap(), gate)
+}

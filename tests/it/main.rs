@@ -1,0 +1,15 @@
+//! All integration tests, one binary. `common` is the shared runner and seed table: every index,
+//! culler and oracle that is registered runs through it.
+
+mod broken;
+mod cli;
+mod common;
+mod determinism;
+mod golden;
+mod held;
+mod index;
+mod lavapipe;
+mod margins;
+mod partition;
+mod snapshots;
+mod tidy;

@@ -1,0 +1,190 @@
+//! The margins of the projection: what they must cover is covered, and at, under and over each bound
+//! the answer is the one derived.
+
+use glam::{DMat4, DVec3, DVec4};
+use plainsight::math::{
+    Aabb, CLIP_ERROR_GAMMA, ClipBox, ClipError, DEPTH_ROUNDING, Projection, inflated_box,
+    rounded_clip_matrix,
+};
+use plainsight::scene::{Camera, Stream, Viewport};
+use plainsight_reference::{Draw, Image, naive};
+
+const VIEWPORT: Viewport = Viewport { width: 201, height: 133 };
+
+fn camera(near: f64, far: f64) -> DMat4 {
+    let (eye, forward) = (DVec3::ZERO, DVec3::NEG_Z);
+    Camera { eye, forward, fov_y: 1.0, near, far }.clip_from_world(VIEWPORT)
+}
+
+/// Clip coordinates (x, y, z, w) = (x, y, z, 1): boxes can be put where a test wants them.
+fn plain(min: [f64; 3], max: [f64; 3]) -> ClipBox {
+    let aabb = Aabb::new(DVec3::from_array(min), DVec3::from_array(max));
+    ClipBox::new(&aabb, &DMat4::IDENTITY, &ClipError::ZERO)
+}
+
+#[test]
+fn the_frustum_is_closed_up_to_the_error() {
+    let at = |x: f64| plain([x, 0.0, 0.5], [x + 0.1, 0.1, 0.6]).outside_frustum();
+    assert!(at(1.0 + 1e-12) && !at(1.0) && !at(1.0 - 1e-12));
+    let mut error = ClipError::ZERO;
+    error.bound = [1e-6, 0.0, 0.0, 1e-6];
+    let with = |x: f64| {
+        let aabb = Aabb::new(DVec3::new(x, 0.0, 0.5), DVec3::new(x + 0.1, 0.1, 0.6));
+        ClipBox::new(&aabb, &DMat4::IDENTITY, &error).outside_frustum()
+    };
+    assert!(with(1.0 + 2.1e-6) && !with(1.0 + 1.9e-6));
+    let nan = plain([f64::NAN; 3], [f64::NAN; 3]);
+    assert!(!nan.outside_frustum(), "NaN is not outside");
+    assert_eq!(nan.project(10, 10), Projection::Unbounded, "what cannot be projected is visible");
+}
+
+#[test]
+fn the_near_plane_makes_visible() {
+    let nearest = |z: f64| plain([0.0, 0.0, z], [0.1, 0.1, 0.5]).project(100, 100);
+    assert_eq!(nearest(0.0), Projection::Unbounded);
+    assert_eq!(nearest(-1e-9), Projection::Unbounded);
+    assert!(matches!(nearest(1e-3), Projection::Within { .. }));
+}
+
+#[test]
+fn rectangle_and_depth_are_rounded_outward_by_their_margins() {
+    // x from 0 to 0.5 of 100 pixels: columns 50 to 75, one pixel more on each side.
+    let Projection::Within { rectangle, depth } =
+        plain([0.0, 0.0, 0.5], [0.5, 0.5, 0.6]).project(100, 100)
+    else {
+        panic!("within")
+    };
+    assert_eq!((rectangle.min, rectangle.max), ([49, 24], [76, 51]));
+    assert!(f64::from(depth) <= 0.5 - DEPTH_ROUNDING);
+    assert!(f64::from(depth.next_up()) > 0.5 - DEPTH_ROUNDING);
+    // A hair beyond a pixel's edge takes the next pixel.
+    let Projection::Within { rectangle, .. } =
+        plain([-1e-9, 0.0, 0.5], [0.5 + 1e-9, 0.5, 0.6]).project(100, 100)
+    else {
+        panic!("within")
+    };
+    assert_eq!((rectangle.min[0], rectangle.max[0]), (48, 77));
+}
+
+#[test]
+fn the_clip_error_bounds_what_f32_does() {
+    let mut stream = Stream::new(9, "clip error");
+    let mut worst = 0.0_f64;
+    for _ in 0..20_000 {
+        let far_out = libm_pow10(stream.range(-2.0, 6.0));
+        let place = DVec3::new(stream.range(-1.0, 1.0), stream.range(-1.0, 1.0), -3.0) * far_out;
+        let world = DMat4::from_translation(place)
+            * DMat4::from_scale(DVec3::splat(stream.range(0.1, 9.0)));
+        let clip = camera(0.1 * far_out, 100.0 * far_out);
+        let reach = DVec3::splat(stream.range(0.0, 2.0));
+        let p = [reach.x as f32, -reach.y as f32, reach.z as f32];
+        let exact = clip * world * DVec3::from_array(p.map(f64::from)).extend(1.0);
+        let m = rounded_clip_matrix(&(clip * world));
+        let error = ClipError::of(&clip, &world, DVec3::from_array(p.map(f64::from)).abs());
+        for row in 0..4 {
+            let f32s = ((m[row] * p[0] + m[4 + row] * p[1]) + m[8 + row] * p[2]) + m[12 + row];
+            let off = (f64::from(f32s) - exact[row]).abs();
+            assert!(off <= error.bound[row], "row {row}: {off} beyond {}", error.bound[row]);
+            worst = worst.max(off / error.bound[row]);
+        }
+    }
+    // The bound is no wild exaggeration: of its 23 roundings, five are those of the transform.
+    assert!(worst > 0.03, "the bound is {worst} used: too wide to mean anything");
+    assert!(CLIP_ERROR_GAMMA < 24.0 * f64::from(f32::EPSILON) / 2.0);
+}
+
+fn libm_pow10(exponent: f64) -> f64 {
+    10.0_f64.powf(exponent)
+}
+
+/// Triangles inside a box never show outside its rectangle, nor nearer than its depth, nor where the
+/// inflated box has no sample at that depth or before.
+#[test]
+fn proxies_cover_their_contents() {
+    let mut stream = Stream::new(4, "contents");
+    let (mut samples, mut boxes) = (0, 0);
+    for round in 0..600 {
+        let far_out = libm_pow10(stream.range(-1.0, 5.0));
+        let place =
+            DVec3::new(stream.range(-1.0, 1.0), stream.range(-1.0, 1.0), stream.range(-9.0, -2.0));
+        let world = DMat4::from_translation(place * far_out)
+            * DMat4::from_rotation_y(stream.range(-3.0, 3.0))
+            * DMat4::from_scale(DVec3::splat(far_out * stream.range(0.01, 1.0)));
+        let clip = camera(0.01 * far_out, 100.0 * far_out);
+        let point = |stream: &mut Stream| {
+            [0; 3].map(|_| {
+                // On a face of the box every other time.
+                let free = stream.range(-1.0, 1.0);
+                (if stream.below(2) == 0 { free } else { free.signum() }) as f32
+            })
+        };
+        let positions: Vec<[f32; 3]> = (0..12).map(|_| point(&mut stream)).collect();
+        let triangles: Vec<[u32; 3]> = (0..4).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let bounds = Aabb::of_points(&positions);
+        let error = ClipError::of(&clip, &world, bounds.max_abs());
+        let seen = ClipBox::new(&bounds, &(clip * world), &error);
+        let mut image = Image::new(VIEWPORT);
+        let clip_from_object = rounded_clip_matrix(&(clip * world));
+        let draw = Draw {
+            positions: &positions,
+            triangles: &triangles,
+            ranks: &[0, 1, 2, 3],
+            first_draw: 0,
+            clip_from_object,
+        };
+        naive::draw(&mut image, &draw);
+        let shown: Vec<usize> =
+            (0..image.samples().len()).filter(|&s| image.draw_index(s).is_some()).collect();
+        match seen.project(VIEWPORT.width, VIEWPORT.height) {
+            Projection::Nowhere => assert!(shown.is_empty(), "round {round}"),
+            Projection::Unbounded => {}
+            Projection::Within { rectangle, depth } => {
+                for &sample in &shown {
+                    let (x, y) = (sample as u32 % VIEWPORT.width, sample as u32 / VIEWPORT.width);
+                    assert!((rectangle.min[0]..rectangle.max[0]).contains(&x), "round {round}");
+                    assert!((rectangle.min[1]..rectangle.max[1]).contains(&y), "round {round}");
+                    assert!(image.depth(sample) >= depth, "round {round}");
+                }
+                samples += shown.len();
+            }
+        }
+        if let Some(grown) =
+            inflated_box(&bounds, &(clip * world), &error, (VIEWPORT.width, VIEWPORT.height))
+        {
+            boxes += 1;
+            let mut proxy = Image::new(VIEWPORT);
+            draw_box(&mut proxy, &grown, clip_from_object);
+            for &sample in &shown {
+                assert!(
+                    proxy.depth(sample) <= image.depth(sample),
+                    "round {round} sample {sample}"
+                );
+            }
+        }
+    }
+    assert!(samples > 10_000 && boxes > 300, "{samples} samples, {boxes} boxes prove little");
+}
+
+fn draw_box(image: &mut Image, aabb: &Aabb, clip_from_object: [f32; 16]) {
+    let positions = aabb.corners().map(|c| c.as_vec3().to_array());
+    let faces =
+        [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
+    let triangles: Vec<[u32; 3]> =
+        faces.iter().flat_map(|&[a, b, c, d]: &[u32; 4]| [[a, b, c], [a, c, d]]).collect();
+    let ranks: Vec<u32> = (0..12).collect();
+    let draw = Draw {
+        positions: &positions,
+        triangles: &triangles,
+        ranks: &ranks,
+        first_draw: 0,
+        clip_from_object,
+    };
+    naive::draw(image, &draw);
+}
+
+#[test]
+fn a_matrix_without_inverse_gives_no_box() {
+    let flat = DMat4::from_cols(DVec4::X, DVec4::Y, DVec4::ZERO, DVec4::new(0.0, 0.0, 0.5, 1.0));
+    let aabb = Aabb::new(DVec3::ZERO, DVec3::ONE);
+    assert_eq!(inflated_box(&aabb, &flat, &ClipError::ZERO, (10, 10)), None);
+}

@@ -1,0 +1,123 @@
+//! Cut meshes: nothing lost, nothing doubled, ids stable, trees sound.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use plainsight::math::Aabb;
+use plainsight::part::{ObjectId, PartedMesh, Partition, PartitionKnobs};
+
+use crate::common::{SCENES, world};
+
+fn area(mesh: &PartedMesh, triangle: [[f32; 3]; 3]) -> f64 {
+    let _ = mesh;
+    let [a, b, c] = triangle.map(|p| DVec3::from_array(p.map(f64::from)));
+    (b - a).cross(c - a).length() * 0.5
+}
+
+fn corners(mesh: &PartedMesh, part: usize, triangle: usize) -> [[f32; 3]; 3] {
+    let first = mesh.parts[part].first_vertex;
+    mesh.triangles[triangle].map(|corner| mesh.positions[(first + corner) as usize])
+}
+
+#[test]
+fn fragments_tile_their_source_triangles() {
+    for scene in SCENES {
+        let world = world(scene, 2, 0.02, 1);
+        for (mesh, source) in world.partition.meshes().iter().zip(&world.scene.meshes) {
+            let mut sums: BTreeMap<u32, f64> = BTreeMap::new();
+            for (number, part) in mesh.parts.iter().enumerate() {
+                for i in part.first_triangle..part.first_triangle + part.triangle_count {
+                    let rank = mesh.ranks[i as usize];
+                    assert_eq!(mesh.triangle_of_rank[rank as usize], i);
+                    assert_eq!(mesh.part_of_rank[rank as usize], number as u32);
+                    let size = area(mesh, corners(mesh, number, i as usize));
+                    *sums.entry(mesh.source_of_rank[rank as usize]).or_default() += size;
+                }
+            }
+            assert!(mesh.source_of_rank.is_sorted());
+            assert_eq!(sums.len(), source.triangles().len(), "{scene}: a triangle was lost");
+            for (source_triangle, sum) in sums {
+                let whole = source.triangles()[source_triangle as usize];
+                let whole = area(mesh, whole.map(|corner| source.positions()[corner as usize]));
+                // Cut points are rounded to f32: 2⁻²⁴ of coordinates of about 10, on each side.
+                let margin = 1e-5 * (whole.sqrt() + 1e-3) * 10.0;
+                assert!(
+                    (sum - whole).abs() <= margin,
+                    "{scene} {source_triangle}: {sum} of {whole}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn trees_are_sound_and_leaves_under_the_limit() {
+    for scene in SCENES {
+        let world = world(scene, 2, 0.02, 1);
+        for mesh in world.partition.meshes() {
+            for part in &mesh.parts {
+                let run =
+                    part.first_vertex as usize..(part.first_vertex + part.vertex_count) as usize;
+                assert_eq!(Aabb::of_points(&mesh.positions[run]), part.bounds);
+            }
+            let Some(tree) = &mesh.tree else {
+                assert_eq!(mesh.parts.len(), 1);
+                continue;
+            };
+            let mut next_part = 0;
+            for node in &tree.nodes {
+                let parts = &mesh.parts[node.first_part as usize..node.end_part as usize];
+                let bounds = parts.iter().fold(Aabb::EMPTY, |all, part| all.union(&part.bounds));
+                assert!(node.bounds.contains(&bounds));
+                match node.children {
+                    None => {
+                        assert_eq!((node.first_part, node.end_part), (next_part, next_part + 1));
+                        next_part += 1;
+                        // A leaf above the limit must be one that no plane parts.
+                        assert!(parts[0].triangle_count <= 256 || scene == "soup", "{scene}");
+                    }
+                    Some([low, high]) => {
+                        let (axis, at) = (node.plane.0 as usize, f64::from(node.plane.1));
+                        assert!(tree.nodes[low as usize].bounds.max[axis] <= at);
+                        assert!(tree.nodes[high as usize].bounds.min[axis] >= at);
+                    }
+                }
+            }
+            assert_eq!(next_part as usize, mesh.parts.len());
+        }
+    }
+}
+
+#[test]
+fn ids_count_up_over_objects_and_find_their_way_back() {
+    let world = world("city", 2, 0.02, 1);
+    let partition = &world.partition;
+    let (mut part, mut draw) = (0, 0);
+    for object in (0..partition.object_count()).map(ObjectId) {
+        assert_eq!((partition.first_part(object).0, partition.first_draw(object)), (part, draw));
+        let mesh = partition.mesh(object);
+        for id in partition.parts_of(object) {
+            assert_eq!(partition.locate(id), (object, id.0 - part));
+        }
+        let last = draw + mesh.triangles.len() as u32 - 1;
+        assert_eq!(partition.source_of_draw(last).0, object);
+        part += mesh.parts.len() as u32;
+        draw += mesh.triangles.len() as u32;
+    }
+    assert_eq!((partition.part_count(), partition.fragment_count()), (part, draw));
+}
+
+/// Cutting is a function of the mesh and the knobs, whatever the number of threads.
+#[test]
+fn the_cut_does_not_depend_on_threads() {
+    let world = world("bunnies", 2, 0.05, 1);
+    let cut = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let knobs = PartitionKnobs { leaf_triangles: 100 };
+        let partition = pool.install(|| Partition::new(&world.scene, knobs));
+        let of =
+            |mesh: &std::sync::Arc<PartedMesh>| (mesh.triangles.clone(), mesh.positions.clone());
+        partition.meshes().iter().map(of).collect::<Vec<_>>()
+    };
+    assert!(cut(1) == cut(3));
+}

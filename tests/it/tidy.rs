@@ -1,0 +1,109 @@
+//! The borders of the house, held: imports only from rooms above, module docs, file length, banned
+//! words.
+
+use std::path::{Path, PathBuf};
+
+/// Rooms from the top; a room may import only those before it.
+const ROOMS: [&str; 11] =
+    ["math", "scene", "part", "effect", "index", "oracle", "cull", "run", "check", "report", "cli"];
+/// Rooms that may not be imported although they stand above.
+const FORBIDDEN: [(&str, &[&str]); 4] = [
+    ("index", &["scene", "effect"]),
+    ("oracle", &["index", "effect"]),
+    ("part", &["effect"]),
+    ("cull", &["effect", "run"]),
+];
+/// No file is longer.
+const MOST_LINES: usize = 800;
+
+fn sources(folder: &str) -> Vec<(PathBuf, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut found = Vec::new();
+    let mut folders = vec![root.join(folder)];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                found.push((path.strip_prefix(root).unwrap().to_owned(), text));
+            }
+        }
+    }
+    assert!(!found.is_empty(), "{folder} holds no sources");
+    found
+}
+
+fn room(path: &Path) -> Option<usize> {
+    let name = path.components().nth(1)?.as_os_str().to_str()?;
+    ROOMS.iter().position(|room| *room == name)
+}
+
+#[test]
+fn rooms_import_only_from_above() {
+    for (path, text) in sources("src") {
+        let Some(own) = room(&path) else { continue };
+        for (place, other) in ROOMS.iter().enumerate() {
+            let imported = text.contains(&format!("crate::{other}"));
+            let forbidden = FORBIDDEN
+                .iter()
+                .any(|(room, others)| *room == ROOMS[own] && others.contains(other));
+            // The viewport and the camera are words of `scene` that everything below it speaks.
+            let words = ["Viewport", "Camera", "Camera, Viewport"];
+            let only_words =
+                text.lines().filter(|line| line.contains(&format!("crate::{other}"))).all(|line| {
+                    words.iter().any(|w| {
+                        line == format!("use crate::scene::{w};")
+                            || line == format!("use crate::scene::{{{w}}};")
+                    })
+                });
+            let wrong = place > own || (forbidden && !only_words);
+            assert!(!(imported && wrong), "{} may not import {other}", path.display());
+        }
+    }
+}
+
+#[test]
+fn only_one_folder_names_wgpu() {
+    for (path, text) in sources("src") {
+        let inside = path.starts_with("src/oracle/wgpu");
+        let names =
+            text.contains("wgpu::") && !text.replace("oracle::wgpu::", "").contains("wgpu::");
+        assert!(inside || names || !text.contains("wgpu::"), "{} names wgpu", path.display());
+    }
+}
+
+#[test]
+fn the_reference_knows_nothing_of_plainsight() {
+    for (path, text) in sources("reference/src") {
+        for word in ["plainsight::", "glam"] {
+            assert!(!text.contains(word), "{} names {word}", path.display());
+        }
+    }
+}
+
+#[test]
+fn every_file_opens_with_its_doc_and_stays_short() {
+    for folder in ["src", "reference/src", "tests", "examples"] {
+        for (path, text) in sources(folder) {
+            assert!(text.starts_with("//!"), "{} has no module doc", path.display());
+            let lines = text.lines().count();
+            assert!(lines <= MOST_LINES, "{} has {lines} lines", path.display());
+        }
+    }
+}
+
+#[test]
+fn nothing_compared_sees_a_clock_or_hash_order() {
+    for folder in ["src", "reference/src"] {
+        for (path, text) in sources(folder) {
+            for word in ["HashMap", "HashSet", "SystemTime", "thread_rng"] {
+                assert!(!text.contains(word), "{} uses {word}", path.display());
+            }
+            // The wall clock is read in one place, for a figure that is never compared.
+            let clock = text.contains("Instant") && !path.ends_with("run/lane.rs");
+            assert!(!clock, "{} reads the clock", path.display());
+        }
+    }
+}
