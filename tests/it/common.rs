@@ -13,18 +13,18 @@ use plainsight::scene::Viewport;
 use plainsight::scene::generate::{Knobs, build};
 
 /// Scenes of the shared tests; `model` needs a file.
-pub const SCENES: [&str; 4] = ["bunnies", "city", "rooms", "soup"];
+pub(crate) const SCENES: [&str; 4] = ["bunnies", "city", "rooms", "soup"];
 /// Oracles of the shared tests.
-pub const ORACLES: [&str; 3] = ["sim", "hardware", "always"];
+pub(crate) const ORACLES: [&str; 3] = ["sim", "hardware", "always"];
 
 /// The device, opened once. A test that needs one fails without it.
-pub fn gpu() -> &'static Arc<Gpu> {
+pub(crate) fn gpu() -> &'static Arc<Gpu> {
     static GPU: OnceLock<Arc<Gpu>> = OnceLock::new();
     GPU.get_or_init(|| Gpu::open(None).unwrap_or_else(|error| panic!("{error}")))
 }
 
 /// A world small enough for debug builds.
-pub fn world(scene: &str, seed: u64, scale: f64, frames: u32) -> World {
+pub(crate) fn world(scene: &str, seed: u64, scale: f64, frames: u32) -> World {
     let knobs = Knobs {
         seed: Some(seed),
         scale: Some(scale),
@@ -37,7 +37,7 @@ pub fn world(scene: &str, seed: u64, scale: f64, frames: u32) -> World {
 }
 
 /// An oracle by name.
-pub fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
+pub(crate) fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
     let stage = Stage { partition: world.partition.clone(), viewport: world.scene.viewport };
     match name {
         "sim" => Box::new(Sim::new(stage)),
@@ -51,7 +51,7 @@ pub fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
 }
 
 /// Runs one lane through the gate.
-pub fn gate(
+pub(crate) fn gate(
     world: &World,
     culler: CullerKind,
     index: IndexKind,

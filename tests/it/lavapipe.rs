@@ -94,8 +94,8 @@ fn coverage_and_depth_by_class() {
             naive::draw(&mut image, &part_draw(&partition, part, &matrices));
             let there = device.redraw(&[part]).unwrap().unwrap();
             let ids = there.parts.unwrap();
-            for sample in 0..image.samples().len() {
-                let (ours, theirs) = (image.draw_index(sample).is_some(), ids[sample] != 0);
+            for (sample, &id) in ids.iter().enumerate() {
+                let (ours, theirs) = (image.draw_index(sample).is_some(), id != 0);
                 samples += u32::from(ours);
                 differ += u32::from(ours != theirs);
                 if ours && theirs {

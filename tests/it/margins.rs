@@ -48,22 +48,22 @@ fn the_near_plane_makes_visible() {
 
 #[test]
 fn rectangle_and_depth_are_rounded_outward_by_their_margins() {
-    // x from 0 to 0.5 of 100 pixels: columns 50 to 75, one pixel more on each side.
-    let Projection::Within { rectangle, depth } =
-        plain([0.0, 0.0, 0.5], [0.5, 0.5, 0.6]).project(100, 100)
-    else {
-        panic!("within")
-    };
+    let within =
+        |x0: f64, x1: f64| match plain([x0, 0.005, 0.5], [x1, 0.495, 0.6]).project(100, 100) {
+            Projection::Within { rectangle, depth } => (rectangle, depth),
+            other => panic!("{other:?}"),
+        };
+    // Columns 50.25 to 74.75 and rows 25.25 to 49.75 of 100, one pixel more on each side, then whole.
+    let (rectangle, depth) = within(0.005, 0.495);
     assert_eq!((rectangle.min, rectangle.max), ([49, 24], [76, 51]));
     assert!(f64::from(depth) <= 0.5 - DEPTH_ROUNDING);
-    assert!(f64::from(depth.next_up()) > 0.5 - DEPTH_ROUNDING);
-    // A hair beyond a pixel's edge takes the next pixel.
-    let Projection::Within { rectangle, .. } =
-        plain([-1e-9, 0.0, 0.5], [0.5 + 1e-9, 0.5, 0.6]).project(100, 100)
-    else {
-        panic!("within")
-    };
-    assert_eq!((rectangle.min[0], rectangle.max[0]), (48, 77));
+    assert!(f64::from(depth.next_up()) > 0.5 - 2.0 * DEPTH_ROUNDING);
+    // Half a pixel further on each side takes the next column; an edge exactly on a column's takes it
+    // too, for the corner's own rounding is added.
+    let (wider, _) = within(-0.005, 0.505);
+    assert_eq!((wider.min[0], wider.max[0]), (48, 77));
+    let (at, _) = within(0.0, 0.5);
+    assert_eq!((at.min[0], at.max[0]), (48, 77));
 }
 
 #[test]

@@ -68,7 +68,7 @@ impl Images {
                 slice.get_mapped_range().map_err(|error| OracleError::Lost(error.to_string()))?;
             let (depth, ids) = mapped.split_at(image_bytes(self.viewport) as usize);
             ReadBack {
-                depth: self.rows(depth).map(|word| f32::from_bits(word)).collect(),
+                depth: self.rows(depth).map(f32::from_bits).collect(),
                 parts: self.ids.is_some().then(|| self.rows(ids).collect()),
             }
         };

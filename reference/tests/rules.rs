@@ -1,0 +1,274 @@
+//! The raster rules as properties: watertight edges, exact coverage, exact depth, order independence,
+//! and the fast renderer equal to the naive one.
+
+use plainsight_reference::{Draw, Image, Viewport, fast, naive};
+use proptest::prelude::*;
+
+const IDENTITY: [f32; 16] =
+    [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+/// w = −z, z from 0 at −1 to w at −100: a camera at the origin.
+const PERSPECTIVE: [f32; 16] = [
+    1.2,
+    0.0,
+    0.0,
+    0.0,
+    0.0,
+    1.5,
+    0.0,
+    0.0,
+    0.0,
+    0.0,
+    -100.0 / 99.0,
+    -1.0,
+    0.0,
+    0.0,
+    -100.0 / 99.0,
+    0.0,
+];
+
+fn draw<'a>(m: [f32; 16], p: &'a [[f32; 3]], t: &'a [[u32; 3]], ranks: &'a [u32]) -> Draw<'a> {
+    Draw { positions: p, triangles: t, ranks, first_draw: 0, clip_from_object: m }
+}
+
+/// How many triangles cover each sample, drawn one by one.
+fn layers(viewport: Viewport, m: [f32; 16], p: &[[f32; 3]], t: &[[u32; 3]]) -> Vec<u32> {
+    let mut layers = vec![0; (viewport.width * viewport.height) as usize];
+    for triangle in t {
+        let mut image = Image::new(viewport);
+        naive::draw(&mut image, &draw(m, p, std::slice::from_ref(triangle), &[0]));
+        for (sample, layer) in layers.iter_mut().enumerate() {
+            *layer += u32::from(image.draw_index(sample).is_some());
+        }
+    }
+    layers
+}
+
+fn viewport() -> impl Strategy<Value = Viewport> {
+    (1_u32..90, 1_u32..70).prop_map(|(width, height)| Viewport { width, height })
+}
+
+/// Coordinates from tiny to huge, many on a coarse grid so that ties and degenerate cases are common.
+fn coordinate() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        4 => -1.2_f32..1.2,
+        3 => (-8_i8..9).prop_map(|i| f32::from(i) * 0.125),
+        1 => -30.0_f32..30.0,
+        1 => Just(0.0_f32),
+        1 => -1e-6_f32..1e-6,
+        1 => -1e20_f32..1e20,
+    ]
+}
+
+fn soup(most: usize) -> impl Strategy<Value = (Vec<[f32; 3]>, Vec<[u32; 3]>)> {
+    prop::collection::vec([coordinate(), coordinate(), coordinate()], 3..20).prop_flat_map(
+        move |positions| {
+            let n = positions.len() as u32;
+            (Just(positions), prop::collection::vec([0..n, 0..n, 0..n], 1..most))
+        },
+    )
+}
+
+fn corner() -> impl Strategy<Value = [f32; 3]> {
+    [-1.1_f32..1.1, -1.1_f32..1.1, 0.0_f32..1.0]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Two triangles over a quad that covers the whole screen: every sample once, also where near or
+    /// the guard band cut them.
+    #[test]
+    fn a_shared_edge_is_watertight(
+        viewport in viewport(),
+        reach in 1.2_f32..2000.0,
+        depth in 1.5_f32..90.0,
+        tilt in -0.3_f32..0.3,
+        shift in [-0.05_f32..0.05, -0.05_f32..0.05],
+    ) {
+        let r = reach * depth;
+        let [a, b, c, d] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .map(|[x, y]: [f32; 2]| [(x + shift[0]) * r, (y + shift[1]) * r, -depth + tilt * x]);
+        let covered = layers(viewport, PERSPECTIVE, &[a, b, c, d], &[[0, 1, 2], [0, 2, 3]]);
+        prop_assert!(covered.iter().all(|&layers| layers == 1), "{covered:?}");
+    }
+
+    /// A fan round a point over the whole screen: every sample once, whatever the spokes.
+    #[test]
+    fn a_fan_is_watertight(
+        viewport in viewport(),
+        center in [-0.9_f32..0.9, -0.9_f32..0.9],
+        mut turns in prop::collection::vec(0.0_f32..1.0, 4..12),
+    ) {
+        turns.extend([0.0, 0.25, 0.5, 0.75]);
+        turns.sort_by(f32::total_cmp);
+        turns.dedup();
+        // Round a square of ±2 whose corners are at quarters.
+        let rim = |t: f32| {
+            let along = (t * 4.0).fract() * 4.0 - 2.0;
+            match (t * 4.0) as u32 {
+                0 => [along, -2.0, 0.5],
+                1 => [2.0, along, 0.5],
+                2 => [-along, 2.0, 0.5],
+                _ => [-2.0, -along, 0.5],
+            }
+        };
+        let mut positions = vec![[center[0], center[1], 0.5]];
+        positions.extend(turns.iter().map(|&t| rim(t)));
+        let n = turns.len() as u32;
+        let triangles: Vec<[u32; 3]> = (0..n).map(|i| [0, 1 + i, 1 + (i + 1) % n]).collect();
+        let covered = layers(viewport, IDENTITY, &positions, &triangles);
+        prop_assert!(covered.iter().all(|&layers| layers == 1), "{covered:?}");
+    }
+
+    /// A triangle cut into fragments with shared cut points: no sample twice.
+    #[test]
+    fn a_cut_is_watertight(
+        viewport in viewport(), a in corner(), b in corner(), c in corner(),
+        at in 0.05_f32..0.95, and in 0.05_f32..0.95,
+    ) {
+        let mix = |a: [f32; 3], b: [f32; 3], t: f32| [0, 1, 2].map(|i| a[i] + (b[i] - a[i]) * t);
+        let positions = [a, b, c, mix(a, b, at), mix(a, c, and)];
+        let triangles = [[0, 3, 4], [3, 1, 2], [3, 2, 4]];
+        // Snapping may turn a needle over; where all fragments keep one orientation none may overlap.
+        let half = [viewport.width as f32 * 0.5, viewport.height as f32 * -0.5];
+        let snapped = positions.map(|p| {
+            [0, 1].map(|i| ((p[i] * half[i] + half[i].abs()) * 256.0).round_ties_even() as i64)
+        });
+        let area = |t: [u32; 3]| {
+            let [a, b, c] = t.map(|i| snapped[i as usize]);
+            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        };
+        let areas = triangles.map(area);
+        prop_assume!(areas.iter().all(|&a| a >= 0) || areas.iter().all(|&a| a <= 0));
+        let cut = layers(viewport, IDENTITY, &positions, &triangles);
+        prop_assert!(cut.iter().all(|&layers| layers <= 1), "{cut:?}");
+    }
+
+    /// Coverage and depth against rational arithmetic on the snapped vertices.
+    #[test]
+    fn coverage_and_depth_are_exact(viewport in viewport(), p in [corner(), corner(), corner()]) {
+        let mut image = Image::new(viewport);
+        naive::draw(&mut image, &draw(IDENTITY, &p, &[[0, 1, 2]], &[0]));
+        let half = [viewport.width as f32 * 0.5, viewport.height as f32 * 0.5];
+        let snap = |v: f32| i128::from((v * 256.0).round_ties_even() as i64);
+        let v = p.map(|[x, y, z]| (snap(x * half[0] + half[0]), snap(y * -half[1] + half[1]), z));
+        for sample in 0..image.samples().len() {
+            let x = (sample as i128 % i128::from(viewport.width)) * 256 + 128;
+            let y = (sample as i128 / i128::from(viewport.width)) * 256 + 128;
+            match rational(v, x, y) {
+                None => prop_assert_eq!(image.draw_index(sample), None, "sample {}", sample),
+                Some((above, below)) => {
+                    prop_assert_eq!(image.draw_index(sample), Some(0), "sample {}", sample);
+                    // above / below is the exact depth times 2⁶⁰.
+                    let scale = (1_u64 << 60) as f64;
+                    let got = image.depth(sample);
+                    let off = ((f64::from(got) * scale) as i128 * below - above).abs();
+                    let ulp = (f64::from(got.next_up() - got) * scale) as i128;
+                    prop_assert!(off <= (ulp + 1) * below, "sample {}: {} of {}", sample, off / below, ulp);
+                }
+            }
+        }
+    }
+
+    /// The image is a function of what is drawn, not of the order; fast equals naive.
+    #[test]
+    fn order_and_renderer_do_not_matter(
+        viewport in viewport(), (positions, triangles) in soup(40), perspective: bool, turn in 0_usize..40,
+    ) {
+        let m = if perspective { PERSPECTIVE } else { IDENTITY };
+        let ranks: Vec<u32> = (0..triangles.len() as u32).collect();
+        let mut image = Image::new(viewport);
+        naive::draw(&mut image, &draw(m, &positions, &triangles, &ranks));
+        let (mut turned, mut turned_ranks) = (triangles.clone(), ranks.clone());
+        turned.rotate_left(turn % triangles.len());
+        turned_ranks.rotate_left(turn % triangles.len());
+        let mut other = Image::new(viewport);
+        naive::draw(&mut other, &draw(m, &positions, &turned, &turned_ranks));
+        prop_assert_eq!(image.hash(), other.hash());
+        prop_assert!(image == other);
+        let mut quick = Image::new(viewport);
+        fast::draw_all(&mut quick, &[draw(m, &positions, &turned, &turned_ranks)]);
+        prop_assert!(image == quick);
+        let one = draw(m, &positions, &triangles[..1], &ranks[..1]);
+        prop_assert_eq!(naive::count(&image, &one), fast::count(&image, &one));
+    }
+}
+
+/// The exact depth times 2⁶⁰ as a fraction, or `None` where the sample is not covered. Written from
+/// the rule's words: a sample on an edge belongs to the triangle whose inside is to the right of the
+/// edge or, on a level edge, below it.
+fn rational(v: [(i128, i128, f32); 3], x: i128, y: i128) -> Option<(i128, i128)> {
+    type Corner = (i128, i128, f32);
+    let cross =
+        |a: Corner, b: Corner, x: i128, y: i128| (b.0 - a.0) * (y - a.1) - (b.1 - a.1) * (x - a.0);
+    let area = cross(v[0], v[1], v[2].0, v[2].1);
+    let mut e = [0; 3];
+    for i in 0..3 {
+        let (a, b, inner) = (v[(i + 1) % 3], v[(i + 2) % 3], v[i]);
+        e[i] = cross(a, b, x, y) * area.signum();
+        let rise = b.1 - a.1;
+        let right = (inner.0 - a.0) * rise.abs() > (b.0 - a.0) * (inner.1 - a.1) * rise.signum();
+        let owned = if rise == 0 { inner.1 > a.1 } else { right };
+        if area == 0 || e[i] < 0 || (e[i] == 0 && !owned) {
+            return None;
+        }
+    }
+    let scaled = |z: f32| (f64::from(z) * (1_u64 << 60) as f64) as i128;
+    Some(((0..3).map(|i| e[i] * scaled(v[i].2)).sum(), area.abs()))
+}
+
+/// A larger picture in several chunks and bands, on one, two and three threads.
+#[test]
+fn fast_equals_naive_on_any_number_of_threads() {
+    let mut state = 1_u64;
+    let mut random = || {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1_u64 << 24) as f32
+    };
+    for viewport in [Viewport { width: 4096, height: 33 }, Viewport { width: 333, height: 251 }] {
+        let mut point = || [random() * 2.4 - 1.2, random() * 2.4 - 1.2, random() * 1.1];
+        let positions: Vec<[f32; 3]> = (0..3000).map(|_| point()).collect();
+        let triangles: Vec<[u32; 3]> = (0..1000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let ranks: Vec<u32> = (0..1000).collect();
+        let draws: Vec<Draw<'_>> = triangles
+            .chunks(90)
+            .zip(ranks.chunks(90))
+            .map(|(t, r)| draw(IDENTITY, &positions, t, r))
+            .collect();
+        let mut image = Image::new(viewport);
+        draws.iter().for_each(|draw| naive::draw(&mut image, draw));
+        assert!((0..image.samples().len()).any(|sample| image.draw_index(sample).is_some()));
+        for threads in 1..=3 {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut quick = Image::new(viewport);
+            pool.install(|| fast::draw_all(&mut quick, &draws));
+            assert!(quick == image, "{threads} threads");
+        }
+    }
+}
+
+/// Near and far at, under and over; depth exactly 1 loses against the cleared image.
+#[test]
+fn near_and_far_are_closed() {
+    let viewport = Viewport { width: 8, height: 8 };
+    let covered = |z: f32| {
+        let p = [[-3.0, -1.0, z], [3.0, -1.0, z], [0.0, 3.0, z]];
+        layers(viewport, IDENTITY, &p, &[[0, 1, 2]]).iter().sum::<u32>()
+    };
+    assert_eq!(covered(0.0_f32.next_down()), 0);
+    assert!(covered(0.0) > 0 && covered(1.0_f32.next_down()) > 0);
+    assert_eq!((covered(1.0), covered(1.0_f32.next_up())), (0, 0));
+}
+
+/// Questions: less or equal, within the rectangle only.
+#[test]
+fn rectangles_count_what_passes() {
+    let mut image = Image::new(Viewport { width: 10, height: 6 });
+    let p = [[-3.0, -3.0, 0.5], [3.0, -3.0, 0.5], [0.0, 6.0, 0.5]];
+    naive::draw(&mut image, &draw(IDENTITY, &p, &[[0, 1, 2]], &[0]));
+    assert_eq!(image.count_rectangle([2, 1], [5, 3], 0.5), 6);
+    assert_eq!(image.count_rectangle([2, 1], [5, 3], 0.5_f32.next_up()), 0);
+    assert_eq!(image.count_rectangle([8, 4], [20, 20], 0.1), 4);
+    assert!(!image.any_rectangle([5, 1], [5, 3], 0.0), "an empty rectangle");
+}
