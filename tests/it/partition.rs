@@ -8,8 +8,7 @@ use plainsight::part::{ObjectId, PartedMesh, Partition, PartitionKnobs};
 
 use crate::common::{SCENES, world};
 
-fn area(mesh: &PartedMesh, triangle: [[f32; 3]; 3]) -> f64 {
-    let _ = mesh;
+fn area(triangle: [[f32; 3]; 3]) -> f64 {
     let [a, b, c] = triangle.map(|p| DVec3::from_array(p.map(f64::from)));
     (b - a).cross(c - a).length() * 0.5
 }
@@ -30,7 +29,7 @@ fn fragments_tile_their_source_triangles() {
                     let rank = mesh.ranks[i as usize];
                     assert_eq!(mesh.triangle_of_rank[rank as usize], i);
                     assert_eq!(mesh.part_of_rank[rank as usize], number as u32);
-                    let size = area(mesh, corners(mesh, number, i as usize));
+                    let size = area(corners(mesh, number, i as usize));
                     *sums.entry(mesh.source_of_rank[rank as usize]).or_default() += size;
                 }
             }
@@ -38,7 +37,7 @@ fn fragments_tile_their_source_triangles() {
             assert_eq!(sums.len(), source.triangles().len(), "{scene}: a triangle was lost");
             for (source_triangle, sum) in sums {
                 let whole = source.triangles()[source_triangle as usize];
-                let whole = area(mesh, whole.map(|corner| source.positions()[corner as usize]));
+                let whole = area(whole.map(|corner| source.positions()[corner as usize]));
                 // Cut points are rounded to f32: 2⁻²⁴ of coordinates of about 10, on each side.
                 let margin = 1e-5 * (whole.sqrt() + 1e-3) * 10.0;
                 assert!(
