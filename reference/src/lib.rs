@@ -10,7 +10,8 @@
 //!   towards the inside one, so two triangles that share an edge get the same bits. A triangle wholly
 //!   inside is not touched; a polygon is fanned from its first vertex.
 //! - **Window**: r = 1/w; column (x·r)·(W/2) + W/2; row (y·r)·(−H/2) + H/2, row 0 on top; depth z·r,
-//!   clamped to [0, 1], never −0. Columns and rows are snapped to 1/256 pixel, ties to even.
+//!   clamped to [0, 1], never −0. Columns and rows are clamped to ±2¹⁵ (which moves nothing but the
+//!   vertices of clipped edges too uneven for f32) and snapped to 1/256 pixel, ties to even.
 //! - **Coverage**: pixel centres at (column + ½, row + ½), exact integers, top-left rule, both faces.
 //!   Zero area after snapping draws nothing.
 //! - **Depth** at a sample: (e₀z₀ + e₁z₁ + e₂z₂) / (e₀ + e₁ + e₂) in f64 in that order, eᵢ the exact

@@ -7,6 +7,9 @@ use crate::image::Viewport;
 /// Sub-pixels in a pixel.
 pub(crate) const SUBPIXELS: i64 = 256;
 
+/// No window coordinate is farther from the origin: the ±2¹⁵ pixels that the integers are sized for.
+const BAND_PIXELS: f32 = 32_768.0;
+
 /// A snapped vertex: sub-pixels from the window's top left corner, and depth in [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct WindowVertex {
@@ -35,7 +38,13 @@ impl Window {
         let row = (y * r) * -self.half[1] + self.half[1];
         // Adding zero turns −0 into +0.
         let depth = (z * r).clamp(0.0, 1.0) + 0.0;
-        let snap = |value: f32| (value * SUBPIXELS as f32).round_ties_even() as i32;
+        // A vertex made by clipping lies within the band but for an edge whose ends differ by more than
+        // 2²⁴ in size, where f32 interpolation means nothing. The clamp keeps the integers in range,
+        // and equal vertices equal, there too.
+        let snap = |value: f32| {
+            let within = value.clamp(-BAND_PIXELS, BAND_PIXELS);
+            (within * SUBPIXELS as f32).round_ties_even() as i32
+        };
         WindowVertex { x: snap(column), y: snap(row), z: depth }
     }
 
