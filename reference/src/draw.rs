@@ -2,6 +2,16 @@
 
 use crate::clip::ClipVertex;
 
+/// Which faces of a triangle are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Faces {
+    /// Both: nothing is assumed closed.
+    #[default]
+    Both,
+    /// Only triangles whose vertices go round counter-clockwise as seen on the screen.
+    CounterClockwise,
+}
+
 /// One run of triangles under one matrix.
 #[derive(Clone, Copy, Debug)]
 pub struct Draw<'a> {
@@ -15,6 +25,8 @@ pub struct Draw<'a> {
     pub first_draw: u32,
     /// Object-to-clip matrix, column-major.
     pub clip_from_object: [f32; 16],
+    /// Which faces count.
+    pub faces: Faces,
 }
 
 impl Draw<'_> {

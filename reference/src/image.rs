@@ -1,4 +1,11 @@
-//! Depth and draw indices of an image, as one ordered word a sample, and questions about it.
+//! Depth and draw indices of an image, as one ordered word a sample; its regions and blocks; and
+//! questions about it.
+//!
+//! The samples lie region by region, a region row by row, so that a region fits the second level cache
+//! and belongs to one thread at a time. For every block of a region the image keeps an upper bound of
+//! its farthest depth (the hierarchy of Greene, Kass & Miller 1993, *Hierarchical Z-buffer
+//! visibility*, with three levels: sample, block, region). Depths only fall between two clears, so a
+//! bound that is not renewed stays a bound.
 
 /// Pixels of an image; both sides at least 1 and at most [`Viewport::MAX_SIDE`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -14,16 +21,52 @@ impl Viewport {
     pub const MAX_SIDE: u32 = 16_384;
 }
 
+/// Columns and rows of a region: 128 KiB of words.
+pub(crate) const REGION: usize = 128;
+/// Columns and rows of a block: a row of it is one cache line.
+pub(crate) const BLOCK: usize = 8;
+/// Blocks along a side of a region.
+pub(crate) const BLOCKS: usize = REGION / BLOCK;
+
 /// A sample without a fragment: depth 1 and no draw index. Bits of non-negative floats order like the
-/// numbers, so the smaller word is the nearer fragment, then the lower draw index.
-const CLEAR: u64 = (1.0_f32.to_bits() as u64) << 32;
+/// numbers, so the smaller word is the nearer fragment, then the lower draw index. Depths reach at
+/// most 1, so words are never negative and may be compared as signed numbers.
+const CLEAR: i64 = (FARTHEST as i64) << 32;
+/// A sample of a region that lies outside the image: nearer than everything, so it takes no fragment
+/// and does not hold the farthest depth of its block back.
+const OUTSIDE: i64 = 0;
+/// Bits of depth 1.
+const FARTHEST: u32 = 1.0_f32.to_bits();
 
 /// A z-buffer with draw indices.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Image {
     viewport: Viewport,
-    samples: Vec<u64>,
+    words: Vec<i64>,
+    /// Per block, bits of a depth that none of its samples lies behind.
+    far: Vec<u32>,
+    /// Per block, whether `far` may be more than the farthest depth.
+    stale: Vec<bool>,
 }
+
+/// One region of an image that is being drawn.
+pub(crate) struct Region<'a> {
+    /// Its first column and row in the image.
+    pub(crate) origin: [i32; 2],
+    /// Columns and rows of it that lie within the image, at least 1.
+    pub(crate) size: [i32; 2],
+    pub(crate) words: &'a mut [i64],
+    pub(crate) far: &'a mut [u32],
+    pub(crate) stale: &'a mut [bool],
+}
+
+impl PartialEq for Image {
+    fn eq(&self, other: &Self) -> bool {
+        self.viewport == other.viewport && self.words == other.words
+    }
+}
+
+impl Eq for Image {}
 
 impl Image {
     /// A cleared image.
@@ -35,7 +78,15 @@ impl Image {
         let Viewport { width, height } = viewport;
         let legal = 1..=Viewport::MAX_SIDE;
         assert!(legal.contains(&width) && legal.contains(&height), "{width}×{height} pixels");
-        Self { viewport, samples: vec![CLEAR; width as usize * height as usize] }
+        let regions = (width as usize).div_ceil(REGION) * (height as usize).div_ceil(REGION);
+        let mut image = Self {
+            viewport,
+            words: vec![OUTSIDE; regions * REGION * REGION],
+            far: vec![0; regions * BLOCKS * BLOCKS],
+            stale: vec![false; regions * BLOCKS * BLOCKS],
+        };
+        image.clear();
+        image
     }
 
     /// Its size.
@@ -46,52 +97,100 @@ impl Image {
 
     /// Forgets every fragment.
     pub fn clear(&mut self) {
-        self.samples.fill(CLEAR);
+        self.regions().for_each(|mut region| region.clear());
     }
 
-    /// One word a sample, row by row from the top: depth bits, then draw index plus one.
+    /// The regions, row by row.
+    pub(crate) fn regions(&mut self) -> impl Iterator<Item = Region<'_>> {
+        let (width, height) = (self.viewport.width as usize, self.viewport.height as usize);
+        let across = width.div_ceil(REGION);
+        let words = self.words.chunks_exact_mut(REGION * REGION);
+        let far = self.far.chunks_exact_mut(BLOCKS * BLOCKS);
+        let stale = self.stale.chunks_exact_mut(BLOCKS * BLOCKS);
+        words.zip(far).zip(stale).enumerate().map(move |(i, ((words, far), stale))| {
+            let (x, y) = (i % across * REGION, i / across * REGION);
+            let size = [(width - x).min(REGION) as i32, (height - y).min(REGION) as i32];
+            Region { origin: [x as i32, y as i32], size, words, far, stale }
+        })
+    }
+
+    /// How many samples it has.
     #[must_use]
-    pub fn samples(&self) -> &[u64] {
-        &self.samples
+    pub fn sample_count(&self) -> usize {
+        self.viewport.width as usize * self.viewport.height as usize
     }
 
-    pub(crate) fn samples_mut(&mut self) -> &mut [u64] {
-        &mut self.samples
+    fn place(&self, column: usize, row: usize) -> usize {
+        let across = (self.viewport.width as usize).div_ceil(REGION);
+        let region = row / REGION * across + column / REGION;
+        (region * REGION + row % REGION) * REGION + column % REGION
+    }
+
+    /// Keeps the smaller of the stored word and `word`.
+    pub(crate) fn lower(&mut self, column: usize, row: usize, word: u64) {
+        let place = self.place(column, row);
+        self.words[place] = self.words[place].min(word as i64);
+        let (block_row, block) = (place / REGION / BLOCK, place % REGION / BLOCK);
+        self.stale[block_row * BLOCKS + block] = true;
+    }
+
+    pub(crate) fn word_at(&self, column: usize, row: usize) -> u64 {
+        self.words[self.place(column, row)] as u64
+    }
+
+    /// The word of a sample (row × width + column): depth bits, then draw index plus one.
+    #[must_use]
+    pub fn word(&self, sample: usize) -> u64 {
+        let width = self.viewport.width as usize;
+        self.word_at(sample % width, sample / width)
+    }
+
+    /// All words (see [`Image::word`]), row by row from the top.
+    pub fn words(&self) -> impl Iterator<Item = u64> + '_ {
+        (0..self.viewport.height as usize)
+            .flat_map(|row| self.pieces(row, 0, self.viewport.width as usize))
+            .flatten()
+            .map(|&word| word as u64)
+    }
+
+    /// Columns `from..to` of a row, cut where regions meet.
+    fn pieces(&self, row: usize, from: usize, to: usize) -> impl Iterator<Item = &[i64]> {
+        (from / REGION..to.div_ceil(REGION)).map(move |region| {
+            let first = from.max(region * REGION);
+            let last = to.min((region + 1) * REGION);
+            let place = self.place(first, row);
+            &self.words[place..place + (last - first)]
+        })
     }
 
     /// Depth at a sample (row × width + column).
     #[must_use]
     pub fn depth(&self, sample: usize) -> f32 {
-        f32::from_bits((self.samples[sample] >> 32) as u32)
+        depth_of(self.word(sample))
     }
 
     /// All depths, row by row.
     pub fn depths(&self) -> impl Iterator<Item = f32> + '_ {
-        self.samples.iter().map(|&word| f32::from_bits((word >> 32) as u32))
+        self.words().map(depth_of)
     }
 
     /// Draw index at a sample; `None` where nothing was drawn.
     #[must_use]
     pub fn draw_index(&self, sample: usize) -> Option<u32> {
-        (self.samples[sample] as u32).checked_sub(1)
+        draw_index_of(self.word(sample))
+    }
+
+    /// All draw indices, row by row.
+    pub fn draw_indices(&self) -> impl Iterator<Item = Option<u32>> + '_ {
+        self.words().map(draw_index_of)
     }
 
     /// A hash of size and samples: FNV-1a over whole words with a rotation, the same everywhere.
     #[must_use]
     pub fn hash(&self) -> u64 {
         let size = u64::from(self.viewport.width) << 32 | u64::from(self.viewport.height);
-        self.samples.iter().fold(size ^ 0xcbf2_9ce4_8422_2325, |hash, &word| {
+        self.words().fold(size ^ 0xcbf2_9ce4_8422_2325, |hash, word| {
             (hash ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29)
-        })
-    }
-
-    fn rows(&self, min: [u32; 2], max: [u32; 2]) -> impl Iterator<Item = &[u64]> {
-        let Viewport { width, height } = self.viewport;
-        let (x0, x1) = (min[0].min(width) as usize, max[0].min(width) as usize);
-        let rows = min[1].min(height) as usize..max[1].min(height) as usize;
-        rows.map(move |y| {
-            let row = &self.samples[y * width as usize..(y + 1) * width as usize];
-            &row[x0.min(x1)..x1]
         })
     }
 
@@ -99,14 +198,82 @@ impl Image {
     /// count nothing.
     #[must_use]
     pub fn count_rectangle(&self, min: [u32; 2], max: [u32; 2], depth: f32) -> u64 {
-        let passes = |word: &&u64| depth <= f32::from_bits((**word >> 32) as u32);
-        self.rows(min, max).map(|row| row.iter().filter(passes).count() as u64).sum()
+        self.near_blocks(min, max, depth)
+            .map(|[x0, y0, x1, y1]| {
+                let passes = |word: &&i64| depth <= depth_of(**word as u64);
+                (y0..y1)
+                    .flat_map(|row| self.pieces(row, x0, x1))
+                    .map(|piece| piece.iter().filter(passes).count() as u64)
+                    .sum::<u64>()
+            })
+            .sum()
     }
 
     /// Whether [`Image::count_rectangle`] is above zero.
     #[must_use]
     pub fn any_rectangle(&self, min: [u32; 2], max: [u32; 2], depth: f32) -> bool {
-        let passes = |word: &u64| depth <= f32::from_bits((word >> 32) as u32);
-        self.rows(min, max).any(|row| row.iter().any(passes))
+        self.near_blocks(min, max, depth).any(|[x0, y0, x1, y1]| {
+            (y0..y1)
+                .flat_map(|row| self.pieces(row, x0, x1))
+                .any(|piece| piece.iter().any(|&word| depth <= depth_of(word as u64)))
+        })
     }
+
+    /// The blocks that meet the half-open rectangle and are not wholly nearer than `depth`, each cut to
+    /// the rectangle: first column and row, then the ends.
+    pub(crate) fn near_blocks(
+        &self,
+        min: [u32; 2],
+        max: [u32; 2],
+        depth: f32,
+    ) -> impl Iterator<Item = [usize; 4]> {
+        let Viewport { width, height } = self.viewport;
+        let (x0, x1) = (min[0] as usize, max[0].min(width) as usize);
+        let (y0, y1) = (min[1] as usize, max[1].min(height) as usize);
+        let columns = if x0 < x1 { x0 / BLOCK..x1.div_ceil(BLOCK) } else { 0..0 };
+        let rows = if y0 < y1 { y0 / BLOCK..y1.div_ceil(BLOCK) } else { 0..0 };
+        rows.flat_map(move |row| columns.clone().map(move |column| (column * BLOCK, row * BLOCK)))
+            .filter(move |&(x, y)| depth <= f32::from_bits(self.far[self.block(x, y)]))
+            .map(move |(x, y)| [x0.max(x), y0.max(y), x1.min(x + BLOCK), y1.min(y + BLOCK)])
+    }
+
+    fn block(&self, column: usize, row: usize) -> usize {
+        let place = self.place(column, row);
+        place / REGION / BLOCK * BLOCKS + place % REGION / BLOCK
+    }
+
+    /// Whether each block's bound holds, and is the farthest depth itself where it is not marked stale.
+    #[must_use]
+    pub fn bounds_hold(&self) -> bool {
+        (0..self.far.len()).all(|block| {
+            let (row, column) = (block / BLOCKS * BLOCK, block % BLOCKS * BLOCK);
+            let place = |i: usize| (row + i / BLOCK) * REGION + column + i % BLOCK;
+            let far = (0..BLOCK * BLOCK).map(|i| (self.words[place(i)] >> 32) as u32).max();
+            let (far, bound) = (far.unwrap_or(0), self.far[block]);
+            far == bound || (far < bound && self.stale[block])
+        })
+    }
+}
+
+impl Region<'_> {
+    /// Forgets every fragment.
+    pub(crate) fn clear(&mut self) {
+        let [width, height] = self.size.map(|side| side as usize);
+        for row in self.words.chunks_exact_mut(REGION).take(height) {
+            row[..width].fill(CLEAR);
+        }
+        for (i, far) in self.far.iter_mut().enumerate() {
+            let within = i % BLOCKS * BLOCK < width && i / BLOCKS * BLOCK < height;
+            *far = if within { FARTHEST } else { 0 };
+        }
+        self.stale.fill(false);
+    }
+}
+
+fn depth_of(word: u64) -> f32 {
+    f32::from_bits((word >> 32) as u32)
+}
+
+fn draw_index_of(word: u64) -> Option<u32> {
+    (word as u32).checked_sub(1)
 }

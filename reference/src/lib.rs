@@ -34,5 +34,5 @@ mod image;
 pub mod naive;
 mod window;
 
-pub use draw::Draw;
+pub use draw::{Draw, Faces};
 pub use image::{Image, Viewport};

@@ -9,9 +9,8 @@ use crate::window::{Oriented, SUBPIXELS, Window, depth, edge, top_left};
 /// Draws into `image`.
 pub fn draw(image: &mut Image, draw: &Draw<'_>) {
     let viewport = image.viewport();
-    fragments(viewport, draw, |sample, depth, id| {
-        let stored = &mut image.samples_mut()[sample];
-        *stored = (*stored).min(u64::from(depth.to_bits()) << 32 | u64::from(id));
+    fragments(viewport, draw, |column, row, depth, id| {
+        image.lower(column, row, u64::from(depth.to_bits()) << 32 | u64::from(id));
     });
 }
 
@@ -20,19 +19,20 @@ pub fn draw(image: &mut Image, draw: &Draw<'_>) {
 #[must_use]
 pub fn count(image: &Image, draw: &Draw<'_>) -> u64 {
     let mut passed = 0;
-    fragments(image.viewport(), draw, |sample, depth, _| {
-        passed += u64::from(depth <= image.depth(sample));
+    fragments(image.viewport(), draw, |column, row, depth, _| {
+        let stored = f32::from_bits((image.word_at(column, row) >> 32) as u32);
+        passed += u64::from(depth <= stored);
     });
     passed
 }
 
-fn fragments(viewport: Viewport, draw: &Draw<'_>, mut emit: impl FnMut(usize, f32, u32)) {
+fn fragments(viewport: Viewport, draw: &Draw<'_>, mut emit: impl FnMut(usize, usize, f32, u32)) {
     assert_eq!(draw.triangles.len(), draw.ranks.len(), "one rank a triangle");
     let window = Window::new(viewport);
     for (i, triangle) in draw.triangles.iter().enumerate() {
         let corners = triangle.map(|vertex| draw.clip_vertex(vertex));
         let Some(polygon) = window.clipper.clip(corners) else { continue };
-        for Oriented { v, area } in window.fan(&polygon) {
+        for Oriented { v, area } in window.fan(&polygon, draw.faces) {
             let low = |at: [i32; 3]| {
                 (i64::from(at.into_iter().min().unwrap_or(0)) / SUBPIXELS - 1).max(0)
             };
@@ -51,8 +51,8 @@ fn fragments(viewport: Viewport, draw: &Draw<'_>, mut emit: impl FnMut(usize, f3
                         e[i] > 0 || (e[i] == 0 && top_left(opposite(i).0, opposite(i).1))
                     };
                     if (0..3).all(inside) {
-                        let sample = (row * i64::from(viewport.width) + column) as usize;
-                        emit(sample, depth(e, v.map(|v| v.z), area), draw.stored_id(i));
+                        let depth = depth(e, v.map(|v| v.z), area);
+                        emit(column as usize, row as usize, depth, draw.stored_id(i));
                     }
                 }
             }

@@ -2,6 +2,7 @@
 //! rasterize.
 
 use crate::clip::{ClipVertex, Clipper, Polygon};
+use crate::draw::Faces;
 use crate::image::Viewport;
 
 /// Sub-pixels in a pixel.
@@ -48,12 +49,17 @@ impl Window {
         WindowVertex { x: snap(column), y: snap(row), z: depth }
     }
 
-    /// The window triangles of a clipped polygon, fanned from its first corner.
-    pub(crate) fn fan<'a>(&'a self, polygon: &'a Polygon) -> impl Iterator<Item = Oriented> + 'a {
+    /// The window triangles of a clipped polygon, fanned from its first corner, that show one of the
+    /// `faces`.
+    pub(crate) fn fan<'a>(
+        &'a self,
+        polygon: &'a Polygon,
+        faces: Faces,
+    ) -> impl Iterator<Item = Oriented> + 'a {
         let corners = polygon.corners();
         let first = self.vertex(corners[0]);
         corners[1..].windows(2).filter_map(move |pair| {
-            Oriented::new([first, self.vertex(pair[0]), self.vertex(pair[1])])
+            Oriented::new([first, self.vertex(pair[0]), self.vertex(pair[1])], faces)
         })
     }
 }
@@ -67,11 +73,12 @@ pub(crate) struct Oriented {
 }
 
 impl Oriented {
-    pub(crate) fn new([a, b, c]: [WindowVertex; 3]) -> Option<Self> {
+    /// With rows going down a positive area is clockwise on the screen.
+    pub(crate) fn new([a, b, c]: [WindowVertex; 3], faces: Faces) -> Option<Self> {
         let area = edge(a, b, i64::from(c.x), i64::from(c.y));
         match area {
             0 => None,
-            1.. => Some(Self { v: [a, b, c], area }),
+            1.. => (faces == Faces::Both).then_some(Self { v: [a, b, c], area }),
             _ => Some(Self { v: [a, c, b], area: -area }),
         }
     }

@@ -35,7 +35,7 @@ impl Conservative {
             if pixels > 0 && !drawn[part] {
                 let part = PartId(part as u32);
                 let shows = |sample: &usize| truth.part_at(record.world, *sample) == Some(part);
-                let sample = (0..truth.image.samples().len())
+                let sample = (0..truth.image.sample_count())
                     .find(shows)
                     .expect("a part with visible pixels shows at a sample");
                 let width = truth.image.viewport().width;

@@ -48,9 +48,9 @@ impl ImageCheck {
     pub fn frame(&mut self, record: &FrameRecord<'_>) {
         let image = self.image.get_or_insert_with(|| Image::new(record.world.scene.viewport));
         render(record.world, record.state, record.drawn, image);
-        let (drawn, all) = (image.samples(), record.truth.image.samples());
-        if drawn != all {
-            self.differences.extend(Difference::find(record, |i| drawn[i] != all[i]));
+        let all = &record.truth.image;
+        if image != all {
+            self.differences.extend(Difference::find(record, |i| image.word(i) != all.word(i)));
         }
     }
 

@@ -22,7 +22,7 @@ use crate::scene::Viewport;
 pub use always::Always;
 #[cfg(feature = "hardware")]
 use proxy_mesh::box_proxy_triangles;
-pub use sim::{Sim, part_draw};
+pub use sim::{Sim, part_draw, part_instance};
 
 /// What an oracle is told at the start of a frame.
 #[derive(Clone, Copy, Debug)]

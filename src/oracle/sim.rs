@@ -3,7 +3,8 @@
 
 use std::collections::VecDeque;
 
-use plainsight_reference::{Draw, Image, fast};
+use plainsight_reference::fast::{Instance, Options};
+use plainsight_reference::{Draw, Faces, Image, fast};
 
 use super::proxy_mesh::box_triangles;
 use super::{Answer, FrameView, Oracle, OracleError, Proxy, QueryId, ReadBack, Stage};
@@ -20,7 +21,7 @@ pub struct Sim {
     submitted: VecDeque<Vec<Answer>>,
 }
 
-/// What the renderer needs of one part.
+/// What the naive renderer needs of one part.
 ///
 /// # Panics
 /// For a part or an object that does not exist.
@@ -29,16 +30,31 @@ pub fn part_draw<'a>(partition: &'a Partition, part: PartId, matrices: &[[f32; 1
     let (object, local) = partition.locate(part);
     let mesh = partition.mesh(object);
     let this = &mesh.parts[local as usize];
-    let vertices = this.first_vertex as usize..(this.first_vertex + this.vertex_count) as usize;
-    let triangles =
-        this.first_triangle as usize..(this.first_triangle + this.triangle_count) as usize;
+    let (triangles, ranks) = mesh.triangles_of(this);
     Draw {
-        positions: &mesh.positions[vertices],
-        triangles: &mesh.triangles[triangles.clone()],
-        ranks: &mesh.ranks[triangles],
+        positions: mesh.positions_of(this),
+        triangles,
+        ranks,
         first_draw: partition.first_draw(object),
         clip_from_object: matrices[object.0 as usize],
+        faces: Faces::Both,
     }
+}
+
+/// What the fast renderer needs of one part.
+///
+/// # Panics
+/// For a part or an object that does not exist.
+#[must_use]
+pub fn part_instance<'a>(
+    partition: &'a Partition,
+    part: PartId,
+    matrices: &[[f32; 16]],
+) -> Instance<'a> {
+    let (object, local) = partition.locate(part);
+    let mesh = &partition.mesh(object).drawable[local as usize];
+    let matrix = matrices[object.0 as usize];
+    Instance::new(mesh, partition.first_draw(object), matrix, Faces::Both)
 }
 
 impl Sim {
@@ -60,9 +76,9 @@ impl Sim {
     fn flush(&mut self) {
         let Self { stage, image, matrices, waiting, .. } = self;
         if !waiting.is_empty() {
-            let draws: Vec<Draw<'_>> =
-                waiting.iter().map(|&part| part_draw(&stage.partition, part, matrices)).collect();
-            fast::draw_all(image, &draws);
+            let instance = |&part: &PartId| part_instance(&stage.partition, part, matrices);
+            let instances: Vec<Instance<'_>> = waiting.iter().map(instance).collect();
+            fast::draw(image, &instances, Options::default());
             waiting.clear();
         }
     }
@@ -101,8 +117,9 @@ impl Oracle for Sim {
                     ranks: &ranks,
                     first_draw: 0,
                     clip_from_object: clip_from_box,
+                    faces: Faces::Both,
                 };
-                fast::count(&self.image, &draw) > 0
+                fast::any(&self.image, &draw)
             }
         };
         let query = QueryId(self.asked);

@@ -193,6 +193,7 @@ impl Cutter {
             triangle_of_rank: vec![0; order.len()],
             source_of_rank: order.iter().map(|&(source, _)| source).collect(),
             parts: Vec::new(),
+            drawable: Vec::new(),
             tree: None,
             bounds: self.nodes[0].bounds,
         };

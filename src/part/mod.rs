@@ -72,10 +72,34 @@ pub struct PartedMesh {
     pub source_of_rank: Vec<u32>,
     /// The parts, at least one.
     pub parts: Vec<Part>,
+    /// Each part as the reference draws it; built by [`Partition::new`].
+    pub drawable: Vec<plainsight_reference::fast::Mesh>,
     /// The tree over the parts; `None` for a mesh of one part.
     pub tree: Option<ObjectTree>,
     /// Tight box of all positions.
     pub bounds: Aabb,
+}
+
+impl PartedMesh {
+    /// The positions of a part.
+    #[must_use]
+    pub fn positions_of(&self, part: &Part) -> &[[f32; 3]] {
+        let first = part.first_vertex as usize;
+        &self.positions[first..first + part.vertex_count as usize]
+    }
+
+    /// The triangles of a part and their ranks.
+    #[must_use]
+    pub fn triangles_of(&self, part: &Part) -> (&[[u32; 3]], &[u32]) {
+        let first = part.first_triangle as usize;
+        let range = first..first + part.triangle_count as usize;
+        (&self.triangles[range.clone()], &self.ranks[range])
+    }
+
+    fn drawable(&self, part: &Part) -> plainsight_reference::fast::Mesh {
+        let (triangles, ranks) = self.triangles_of(part);
+        plainsight_reference::fast::Mesh::new(self.positions_of(part), triangles, ranks)
+    }
 }
 
 /// A scene's objects cut into parts, with the numbering that ids follow.
@@ -95,7 +119,11 @@ impl Partition {
     #[must_use]
     pub fn new(scene: &Scene, knobs: PartitionKnobs) -> Self {
         use rayon::prelude::*;
-        let cut = |mesh: &Arc<Mesh>| Arc::new(cut::cut(mesh, knobs));
+        let cut = |mesh: &Arc<Mesh>| {
+            let mut mesh = cut::cut(mesh, knobs);
+            mesh.drawable = mesh.parts.par_iter().map(|part| mesh.drawable(part)).collect();
+            Arc::new(mesh)
+        };
         let meshes: Vec<_> = scene.meshes.par_iter().map(cut).collect();
         let mesh_of_object: Vec<u32> = scene.objects.iter().map(|o| o.mesh).collect();
         let running = |size: &dyn Fn(&PartedMesh) -> usize| {

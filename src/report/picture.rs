@@ -53,7 +53,7 @@ pub fn part_picture(world: &World, image: &Image) -> RgbImage {
 
 fn paint(image: &Image, color: impl Fn(usize) -> [u8; 3]) -> RgbImage {
     let viewport = image.viewport();
-    let bytes = (0..image.samples().len()).flat_map(color).collect();
+    let bytes = (0..image.sample_count()).flat_map(color).collect();
     RgbImage::from_raw(viewport.width, viewport.height, bytes).expect("three bytes a sample")
 }
 

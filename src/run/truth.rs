@@ -1,9 +1,10 @@
 //! The truth of one frame: the reference's image of every part and what is visible in it.
 
-use plainsight_reference::{Draw, Image, fast};
+use plainsight_reference::fast::{Instance, Options};
+use plainsight_reference::{Image, fast};
 
 use super::{FrameState, World};
-use crate::oracle::part_draw;
+use crate::oracle::part_instance;
 use crate::part::{PartId, PartitionKnobs};
 
 /// What the reference says of one frame.
@@ -26,10 +27,15 @@ impl Truth {
         let all: Vec<PartId> = (0..world.partition.part_count()).map(PartId).collect();
         render(world, state, &all, &mut image);
         let mut visible_pixels = vec![0_u32; all.len()];
-        for sample in 0..image.samples().len() {
-            if let Some(draw) = image.draw_index(sample) {
-                visible_pixels[world.partition.part_of_draw(draw).0 as usize] += 1;
-            }
+        // Neighbouring samples mostly show one triangle.
+        let mut last = None;
+        for draw in image.draw_indices().flatten() {
+            let part = match last {
+                Some((same, part)) if same == draw => part,
+                _ => world.partition.part_of_draw(draw),
+            };
+            last = Some((draw, part));
+            visible_pixels[part.0 as usize] += 1;
         }
         let visible_parts = visible_pixels.iter().filter(|&&pixels| pixels > 0).count() as u32;
         let hash = image.hash();
@@ -45,10 +51,9 @@ impl Truth {
 
 /// Clears `image` and renders `parts` into it.
 pub fn render(world: &World, state: &FrameState, parts: &[PartId], image: &mut Image) {
-    image.clear();
-    let draws: Vec<Draw<'_>> =
-        parts.iter().map(|&part| part_draw(&world.partition, part, &state.matrices)).collect();
-    fast::draw_all(image, &draws);
+    let instance = |&part: &PartId| part_instance(&world.partition, part, &state.matrices);
+    let instances: Vec<Instance<'_>> = parts.iter().map(instance).collect();
+    fast::render(image, &instances, Options::default());
 }
 
 /// Samples of frame 0 at which the cut scene shows another object or source triangle than the uncut
@@ -58,9 +63,8 @@ pub fn partition_difference(world: &World) -> u64 {
     let uncut = World::new((*world.scene).clone(), PartitionKnobs { leaf_triangles: u32::MAX });
     let sources = |world: &World| {
         let truth = Truth::of(world, &FrameState::at(world, 0));
-        (0..truth.image.samples().len())
-            .map(|sample| truth.image.draw_index(sample).map(|d| world.partition.source_of_draw(d)))
-            .collect::<Vec<_>>()
+        let source = |draw| world.partition.source_of_draw(draw);
+        truth.image.draw_indices().map(|draw| draw.map(source)).collect::<Vec<_>>()
     };
     sources(world).iter().zip(sources(&uncut)).filter(|(cut, whole)| **cut != *whole).count() as u64
 }

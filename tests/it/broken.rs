@@ -3,8 +3,9 @@
 use plainsight::cli::{EXIT_FAILED, EXIT_HELD, Streams, main};
 use plainsight::cull::{Culler, CullerKind, CullerSetup, Pen, View};
 use plainsight::math::rounded_clip_matrix;
-use plainsight::oracle::{OracleError, part_draw};
+use plainsight::oracle::{OracleError, part_instance};
 use plainsight::part::PartId;
+use plainsight_reference::fast::Options;
 use plainsight_reference::{Image, fast};
 
 /// The frame in which it goes wrong.
@@ -17,10 +18,10 @@ fn visible_part(view: &View<'_>) -> PartId {
     let matrices: Vec<_> =
         view.objects.iter().map(|o| rounded_clip_matrix(&o.clip_from_object)).collect();
     let parts = (0..view.partition.part_count()).map(PartId);
-    let draws: Vec<_> = parts.map(|part| part_draw(view.partition, part, &matrices)).collect();
+    let all: Vec<_> = parts.map(|part| part_instance(view.partition, part, &matrices)).collect();
     let mut image = Image::new(view.viewport);
-    fast::draw_all(&mut image, &draws);
-    let shown = (0..image.samples().len()).find_map(|sample| image.draw_index(sample));
+    fast::render(&mut image, &all, Options::default());
+    let shown = (0..image.sample_count()).find_map(|sample| image.draw_index(sample));
     view.partition.part_of_draw(shown.expect("something is visible"))
 }
 

@@ -125,7 +125,7 @@ fn ids_and_depth_of_whole_scenes() {
         let all: Vec<PartId> = (0..world.partition.part_count()).map(PartId).collect();
         let there = device.redraw(&all).unwrap().unwrap();
         let ids = there.parts.unwrap();
-        let samples = truth.image.samples().len();
+        let samples = truth.image.sample_count();
         let ours = |i: usize| truth.part_at(&world, i).map_or(0, |part| part.0 + 1);
         let differ = (0..samples).filter(|&i| ours(i) != ids[i]).count();
         let drawn = (0..samples).filter(|&i| ours(i) != 0).count();

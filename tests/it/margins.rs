@@ -7,7 +7,7 @@ use plainsight::math::{
     rounded_clip_matrix,
 };
 use plainsight::scene::{Camera, Stream, Viewport};
-use plainsight_reference::{Draw, Image, naive};
+use plainsight_reference::{Draw, Faces, Image, naive};
 
 const VIEWPORT: Viewport = Viewport { width: 201, height: 133 };
 
@@ -131,10 +131,11 @@ fn proxies_cover_their_contents() {
             ranks: &[0, 1, 2, 3],
             first_draw: 0,
             clip_from_object,
+            faces: Faces::Both,
         };
         naive::draw(&mut image, &draw);
         let shown: Vec<usize> =
-            (0..image.samples().len()).filter(|&s| image.draw_index(s).is_some()).collect();
+            (0..image.sample_count()).filter(|&s| image.draw_index(s).is_some()).collect();
         match seen.project(VIEWPORT.width, VIEWPORT.height) {
             Projection::Nowhere => assert!(shown.is_empty(), "round {round}"),
             Projection::Unbounded => {}
@@ -178,6 +179,7 @@ fn draw_box(image: &mut Image, aabb: &Aabb, clip_from_object: [f32; 16]) {
         ranks: &ranks,
         first_draw: 0,
         clip_from_object,
+        faces: Faces::Both,
     };
     naive::draw(image, &draw);
 }

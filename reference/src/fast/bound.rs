@@ -1,0 +1,221 @@
+//! Where the clusters of an instance are on the screen: for sixteen clusters at once, pixels that hold
+//! all their vertices and a depth that none of them is nearer than.
+//!
+//! # Why the bounds hold
+//! Let u = 2⁻²⁴. A clip coordinate is computed with four roundings of terms that add up to at most
+//! S = |m₀|·X + |m₄|·Y + |m₈|·Z + |m₁₂| for coordinates up to X, Y, Z, so it is within γ₄·S of the
+//! exact one (Higham 2002, *Accuracy and Stability of Numerical Algorithms*, §3.1), be it a vertex of
+//! the cluster or a corner of its box, which is computed alike. [`ROUNDINGS`]·u·S covers both together
+//! twice over. The exact clip coordinates of a vertex lie among those of the corners, and so does any
+//! quotient of two of them while the divisor is positive (it is monotone along every segment). What
+//! the divisions, the scaling and the snapping add is in [`Projection::clusters`].
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, mask32x16};
+
+use super::mesh::Mesh;
+use crate::image::Viewport;
+
+/// Roundings of clip coordinates, of a vertex and a corner together (4 + 4), doubled.
+const ROUNDINGS: f64 = 16.0;
+/// The unit roundoff of f32.
+const UNIT: f64 = 1.0 / 16_777_216.0;
+/// A cluster is outside where all its clip coordinates are beyond a plane by this many times the error
+/// of one: new vertices of clipped triangles err by at most γ₁₈ of the largest coordinate more (three
+/// roundings for each of six planes), and 16 · 4 is above 4 + 18 twice over.
+const OUTSIDE: f32 = 4.0;
+/// Clip coordinates below this and sums of two of them overflow nowhere; an instance with larger ones
+/// (or with a matrix that is not finite) is wide altogether.
+const LARGEST: f64 = (1_u128 << 125) as f64;
+/// Largest side of a cluster that takes the narrow path. Differences of sub-pixels up to 120·256 and
+/// samples up to seven columns beyond keep an edge value within 2·(127·256)² < 2³¹.
+pub(crate) const NARROW_PIXELS: i32 = 120;
+
+/// Where a cluster is in one frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// It covers no sample.
+    Outside,
+    /// No vertex is clipped, and all lie on the pixels from `min` to `max`, at most [`NARROW_PIXELS`]
+    /// apart; the bits of no depth are below `near`.
+    Narrow { min: [i16; 2], max: [i16; 2], near: u32 },
+    /// Anything else.
+    Wide,
+}
+
+/// What all clusters of one instance share.
+pub(crate) struct Projection {
+    matrix: [f32; 16],
+    half: [f32; 2],
+    /// Error of a clip coordinate, by component.
+    error: [f32; 4],
+    last: [f32; 2],
+}
+
+impl Projection {
+    pub(crate) fn new(viewport: Viewport, matrix: [f32; 16], reach: [f32; 3]) -> Self {
+        let error = std::array::from_fn(|row| {
+            let m = |column: usize| f64::from(matrix[4 * column + row]).abs();
+            let [x, y, z] = reach.map(f64::from);
+            let sum = m(0) * x + m(1) * y + m(2) * z + m(3);
+            if sum < LARGEST {
+                // Rounded up, so that even a sum of denormals has a margin.
+                ((sum * ROUNDINGS * UNIT) as f32).next_up()
+            } else {
+                f32::INFINITY
+            }
+        });
+        let side = |pixels: u32| pixels as f32;
+        Self {
+            matrix,
+            half: [side(viewport.width) * 0.5, side(viewport.height) * 0.5],
+            error,
+            last: [side(viewport.width), side(viewport.height)],
+        }
+    }
+
+    /// Places of the sixteen clusters from `first` on, a multiple of sixteen.
+    ///
+    /// Every comparison is written so that a coordinate that is no number ends in [`Place::Wide`].
+    #[inline(always)]
+    pub(crate) fn clusters<S: Simd>(&self, s: S, mesh: &Mesh, first: usize) -> [Place; 16] {
+        let load = |i: usize| f32x16::from_slice(s, &mesh.boxes[i][first..first + 16]);
+        let [ex, ey, ez, ew] = self.error;
+        let mut seen = Extremes::new(s);
+        let terms = |axis: usize, row: usize, high: usize| {
+            load(axis + 3 * high) * self.matrix[4 * axis + row]
+        };
+        // The eight corners, each coordinate in the written order.
+        for corner in 0..8 {
+            let clip: [f32x16<S>; 4] = std::array::from_fn(|row| {
+                let [x, y, z] = [0, 1, 2].map(|axis| terms(axis, row, corner >> axis & 1));
+                ((x + y) + z) + self.matrix[12 + row]
+            });
+            seen.add(clip);
+        }
+        let zero = f32x16::splat(s, 0.0);
+        // Distances to the six planes over the corners: all beyond one of them?
+        let beyond = |highest: f32x16<S>, error: f32| highest.simd_lt(-OUTSIDE * error);
+        let outside = beyond(seen.high_z, ez)
+            | beyond(seen.high_far, ez + ew)
+            | beyond(seen.high_left, ex + ew)
+            | beyond(seen.high_right, ex + ew)
+            | beyond(seen.high_bottom, ey + ew)
+            | beyond(seen.high_top, ey + ew);
+        // No vertex before near or behind far, and all before the eye.
+        let least_w = seen.low_w - ew;
+        let whole = least_w.simd_gt(zero) & seen.low_z.simd_ge(ez) & seen.low_far.simd_ge(ez + ew);
+        // A quotient a/w of a vertex differs from the exact one by at most (Ea + |a/w|·Ew) / w, the
+        // corner's likewise (both are in the errors); then come at most eight roundings of numbers up
+        // to the quotient (reciprocal, product, scaling, and the corner's division), and for columns and
+        // rows one of the offset and half a sub-pixel.
+        let unit = UNIT as f32;
+        let spread =
+            |most: f32x16<S>, error: f32| (most * ew + error) / least_w + most * (8.0 * unit);
+        let most = |low: f32x16<S>, high: f32x16<S>| low.abs().max(high.abs());
+        let span = |low: f32x16<S>, high: f32x16<S>, error: f32, half: f32, flip: f32| {
+            let spread = spread(most(low, high), error) * (2.0 * half)
+                + (4.0 * unit * half + 2.0 * unit * half + 1.0 / 256.0);
+            let (a, b) = (low * (half * flip) + half, high * (half * flip) + half);
+            ((a.min(b) - spread).floor(), (a.max(b) + spread).floor())
+        };
+        let (x0, x1) = span(seen.low_x, seen.high_x, ex, self.half[0], 1.0);
+        let (y0, y1) = span(seen.low_y, seen.high_y, ey, self.half[1], -1.0);
+        let aside =
+            x1.simd_lt(0.0) | y1.simd_lt(0.0) | x0.simd_ge(self.last[0]) | y0.simd_ge(self.last[1]);
+        let limit = (NARROW_PIXELS - 1) as f32;
+        let narrow = (x1 - x0).simd_le(limit) & (y1 - y0).simd_le(limit) & whole;
+        let near = (seen.low_depth - spread(most(seen.low_depth, seen.high_depth), ez) * 2.0).max(zero)
+            // Turns −0 into +0.
+            + 0.0;
+        self.places(outside | (narrow & aside), narrow, [x0, y0, x1, y1], near)
+    }
+
+    #[inline(always)]
+    fn places<S: Simd>(
+        &self,
+        outside: mask32x16<S>,
+        narrow: mask32x16<S>,
+        spans: [f32x16<S>; 4],
+        near: f32x16<S>,
+    ) -> [Place; 16] {
+        let (outside, narrow) = (outside.to_bitmask(), narrow.to_bitmask());
+        let [x0, y0, x1, y1] = spans.map(|span| span.to_array());
+        let near = near.to_array();
+        std::array::from_fn(|i| {
+            if outside >> i & 1 == 1 {
+                Place::Outside
+            } else if narrow >> i & 1 == 1 {
+                // Between −120 and 16,504: neither outside nor wide.
+                let pixel = |x: f32, y: f32| [x as i16, y as i16];
+                let (min, max) = (pixel(x0[i], y0[i]), pixel(x1[i], y1[i]));
+                Place::Narrow { min, max, near: near[i].to_bits() }
+            } else {
+                Place::Wide
+            }
+        })
+    }
+}
+
+/// Extremes over the corners of sixteen boxes.
+struct Extremes<S: Simd> {
+    low_x: f32x16<S>,
+    high_x: f32x16<S>,
+    low_y: f32x16<S>,
+    high_y: f32x16<S>,
+    low_depth: f32x16<S>,
+    high_depth: f32x16<S>,
+    low_z: f32x16<S>,
+    high_z: f32x16<S>,
+    low_w: f32x16<S>,
+    /// w − z.
+    low_far: f32x16<S>,
+    high_far: f32x16<S>,
+    /// w + x, w − x, w + y, w − y.
+    high_left: f32x16<S>,
+    high_right: f32x16<S>,
+    high_bottom: f32x16<S>,
+    high_top: f32x16<S>,
+}
+
+impl<S: Simd> Extremes<S> {
+    #[inline(always)]
+    fn new(s: S) -> Self {
+        let (low, high) = (f32x16::splat(s, f32::INFINITY), f32x16::splat(s, f32::NEG_INFINITY));
+        Self {
+            low_x: low,
+            high_x: high,
+            low_y: low,
+            high_y: high,
+            low_depth: low,
+            high_depth: high,
+            low_z: low,
+            high_z: high,
+            low_w: low,
+            low_far: low,
+            high_far: high,
+            high_left: high,
+            high_right: high,
+            high_bottom: high,
+            high_top: high,
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, [x, y, z, w]: [f32x16<S>; 4]) {
+        let keep = |low: &mut f32x16<S>, high: &mut f32x16<S>, value: f32x16<S>| {
+            *low = low.min(value);
+            *high = high.max(value);
+        };
+        keep(&mut self.low_x, &mut self.high_x, x / w);
+        keep(&mut self.low_y, &mut self.high_y, y / w);
+        keep(&mut self.low_depth, &mut self.high_depth, z / w);
+        keep(&mut self.low_z, &mut self.high_z, z);
+        keep(&mut self.low_far, &mut self.high_far, w - z);
+        self.low_w = self.low_w.min(w);
+        self.high_left = self.high_left.max(w + x);
+        self.high_right = self.high_right.max(w - x);
+        self.high_bottom = self.high_bottom.max(w + y);
+        self.high_top = self.high_top.max(w - y);
+    }
+}

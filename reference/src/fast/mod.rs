@@ -1,0 +1,137 @@
+//! The renderer that runs use: equal to [`crate::naive`] bit for bit.
+
+mod bound;
+mod count;
+mod frame;
+mod level;
+mod lookup;
+mod mesh;
+mod narrow;
+mod region;
+mod wide;
+
+use std::ops::Add;
+
+use fearless_simd::dispatch;
+use rayon::prelude::*;
+
+pub use count::{any, count};
+pub use level::SimdLevel;
+pub use mesh::Mesh;
+
+use crate::draw::Faces;
+use crate::image::{Image, Region};
+use frame::Frame;
+use narrow::Room;
+
+/// A mesh somewhere.
+#[derive(Clone, Copy, Debug)]
+pub struct Instance<'a> {
+    mesh: &'a Mesh,
+    first_draw: u32,
+    clip_from_object: [f32; 16],
+    faces: Faces,
+}
+
+impl<'a> Instance<'a> {
+    /// `mesh` under an object-to-clip matrix (column-major). The draw index of triangle `i` is
+    /// `first_draw` plus its rank.
+    ///
+    /// # Panics
+    /// Where a draw index reaches `u32::MAX`.
+    #[must_use]
+    pub fn new(mesh: &'a Mesh, first_draw: u32, clip_from_object: [f32; 16], faces: Faces) -> Self {
+        let highest = first_draw.checked_add(mesh.highest_rank());
+        assert!(highest.is_some_and(|draw| draw < u32::MAX), "a draw index fits 32 bits");
+        Self { mesh, first_draw, clip_from_object, faces }
+    }
+}
+
+/// How to draw. No knob moves a bit of the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Vector instructions; a level that the machine lacks falls back to the best one below it.
+    pub level: SimdLevel,
+    /// Whether clusters strictly behind what is already drawn are left out before their vertices are
+    /// touched. Off, every triangle in view is processed.
+    pub skip_hidden: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { level: SimdLevel::best(), skip_hidden: true }
+    }
+}
+
+/// What one call did. The same for any number of threads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Groups of up to 64 clusters.
+    pub units: u64,
+    /// Units found behind, counted in each region that they may touch.
+    pub units_hidden: u64,
+    /// Clusters outside the view.
+    pub clusters_outside: u64,
+    /// Clusters small on the screen and wholly before the eye.
+    pub clusters_narrow: u64,
+    /// All others: their triangles are set up one by one.
+    pub clusters_wide: u64,
+    /// Small clusters drawn, counted in each region that they touch.
+    pub clusters: u64,
+    /// Small clusters found behind, counted in each region that they touch.
+    pub clusters_hidden: u64,
+    /// Triangles transformed and set up, counted in each region where that happened.
+    pub triangles: u64,
+}
+
+impl Add for Work {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            units: self.units + other.units,
+            units_hidden: self.units_hidden + other.units_hidden,
+            clusters_outside: self.clusters_outside + other.clusters_outside,
+            clusters_narrow: self.clusters_narrow + other.clusters_narrow,
+            clusters_wide: self.clusters_wide + other.clusters_wide,
+            clusters: self.clusters + other.clusters,
+            clusters_hidden: self.clusters_hidden + other.clusters_hidden,
+            triangles: self.triangles + other.triangles,
+        }
+    }
+}
+
+/// Draws the instances into what `image` holds, on as many threads as rayon has.
+pub fn draw(image: &mut Image, instances: &[Instance<'_>], options: Options) -> Work {
+    paint(image, instances, options, false)
+}
+
+/// Clears `image` and draws the instances; quicker than the two one after the other.
+pub fn render(image: &mut Image, instances: &[Instance<'_>], options: Options) -> Work {
+    paint(image, instances, options, true)
+}
+
+fn paint(image: &mut Image, instances: &[Instance<'_>], options: Options, clears: bool) -> Work {
+    let viewport = image.viewport();
+    let level = options.level.or_below();
+    let (frame, work) = Frame::new(level, viewport, instances, options.skip_hidden);
+    let keys = frame.regions(viewport);
+    let mut regions: Vec<(Region<'_>, Vec<u64>)> = image.regions().zip(keys).collect();
+    // The fullest first, so that no thread is left with one at the end.
+    regions.sort_by_key(|(region, keys)| (std::cmp::Reverse(keys.len()), region.origin));
+    let drawn: Vec<Work> = regions
+        .par_iter_mut()
+        .with_max_len(1)
+        .map_init(Room::new, |room, (region, keys)| {
+            if clears {
+                region.clear();
+            }
+            if keys.is_empty() {
+                return Work::default();
+            }
+            keys.sort_unstable();
+            dispatch!(level, s => region::draw(s, &frame, keys, region, room))
+        })
+        .collect();
+    drawn.into_iter().fold(work, Add::add)
+}

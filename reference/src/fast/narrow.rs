@@ -1,0 +1,366 @@
+//! Clusters of small triangles: transformed, snapped, rejected and covered many to a vector.
+//!
+//! Everything is relative to the first of the pixels that hold the cluster. There are at most
+//! [`NARROW_PIXELS`](super::bound::NARROW_PIXELS) of them on a side, so a snapped vertex fits two
+//! 15-bit halves of a word, and edge values fit i32 (see there).
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, f64x8, i16x32, i32x8, i32x16, i64x8, mask64x8, u32x16};
+
+use super::level::LANES;
+use super::mesh::{CLUSTER_VERTICES, Cluster, Mesh};
+use super::{Instance, lookup};
+use crate::draw::Faces;
+use crate::image::{BLOCK, BLOCKS, REGION, Region};
+
+/// Triangles of a full cluster, rounded up to vectors, and one vector more to write beyond the end.
+const SLOTS: usize = 6 * LANES;
+
+/// Room that one thread uses for one cluster after the other.
+pub(crate) struct Room {
+    /// Snapped vertices: column in the low half, row in the high one.
+    snapped: [u32; CLUSTER_VERTICES],
+    depth: [f32; CLUSTER_VERTICES],
+    /// Snapped corners of the triangles.
+    corners: [[u32; SLOTS]; 3],
+    /// Snapped corners of the triangles whose box holds a sample, and the triangles' numbers.
+    kept: [[u32; SLOTS]; 4],
+    set_up: SetUp,
+}
+
+/// Sixteen triangles ready for samples. Vertices 1 and 2 are exchanged where `turned` says so.
+struct SetUp {
+    /// Edge values at the first sample of the box.
+    edges: [[i32; LANES]; 3],
+    /// What an edge that does not own its samples loses: 1 or 0.
+    bias: [[i32; LANES]; 3],
+    /// Change of the edge values from a column to the next, and from a row to the next.
+    right: [[i32; LANES]; 3],
+    down: [[i32; LANES]; 3],
+    /// First and last column and row of the box.
+    first: [[i32; LANES]; 2],
+    last: [[i32; LANES]; 2],
+    turned: u64,
+    /// One sample, and covered.
+    single: u64,
+    /// More than one sample.
+    several: u64,
+}
+
+impl Room {
+    pub(crate) fn new() -> Self {
+        let none = [0; LANES];
+        Self {
+            snapped: [0; CLUSTER_VERTICES],
+            depth: [0.0; CLUSTER_VERTICES],
+            corners: [[0; SLOTS]; 3],
+            kept: [[0; SLOTS]; 4],
+            set_up: SetUp {
+                edges: [none; 3],
+                bias: [none; 3],
+                right: [none; 3],
+                down: [none; 3],
+                first: [none; 2],
+                last: [none; 2],
+                turned: 0,
+                single: 0,
+                several: 0,
+            },
+        }
+    }
+}
+
+/// One cluster to draw into one region.
+pub(crate) struct Job<'a> {
+    pub(crate) mesh: &'a Mesh,
+    pub(crate) instance: &'a Instance<'a>,
+    pub(crate) cluster: Cluster,
+    /// Half the image's columns and rows.
+    pub(crate) half: [f32; 2],
+    /// First of the pixels that hold the cluster.
+    pub(crate) min: [i32; 2],
+}
+
+/// Draws a cluster whose place is narrow.
+#[inline(always)]
+pub(crate) fn draw<S: Simd>(s: S, job: &Job<'_>, region: &mut Region<'_>, room: &mut Room) {
+    job.transform(s, room);
+    let first = job.cluster.first_triangle as usize;
+    let count = usize::from(job.cluster.triangles);
+    for (corner, places) in room.corners.iter_mut().zip(&job.mesh.corners) {
+        let padded = count.next_multiple_of(LANES);
+        lookup::corners(s, &room.snapped, &places[first..first + padded], &mut corner[..padded]);
+    }
+    // The region's pixels from the cluster's first one.
+    let low = [0, 1].map(|axis| (region.origin[axis] - job.min[axis]).max(0));
+    let high = [0, 1].map(|axis| {
+        (region.origin[axis] + region.size[axis] - 1 - job.min[axis]).min(i32::from(i16::MAX))
+    });
+    let kept = keep(s, room, count, low, high);
+    let mut written = false;
+    for from in (0..kept).step_by(LANES) {
+        let lanes = u64::MAX >> (64 - (kept - from).min(LANES));
+        set_up(s, room, from, lanes, job.instance.faces, low, high);
+        written |= job.samples(s, region, room, from);
+    }
+    if written {
+        let at = |pixel: i32, axis: usize| {
+            (pixel - region.origin[axis]).clamp(0, REGION as i32 - 1) as usize / BLOCK
+        };
+        let end = |axis: usize| job.min[axis] + super::bound::NARROW_PIXELS;
+        for row in at(job.min[1], 1)..=at(end(1), 1) {
+            region.stale[row * BLOCKS + at(job.min[0], 0)..=row * BLOCKS + at(end(0), 0)]
+                .fill(true);
+        }
+    }
+}
+
+impl Job<'_> {
+    /// The written transform and window rule, sixteen vertices at a time.
+    #[inline(always)]
+    fn transform<S: Simd>(&self, s: S, room: &mut Room) {
+        let m = &self.instance.clip_from_object;
+        let first = self.cluster.first_vertex as usize;
+        let zero = f32x16::splat(s, 0.0);
+        let [half_x, half_y] = self.half;
+        for at in (0..usize::from(self.cluster.vertices)).step_by(LANES) {
+            let [x, y, z] = [0, 1, 2].map(|axis| {
+                let from = first + at;
+                f32x16::from_slice(s, &self.mesh.positions[axis][from..from + LANES])
+            });
+            let clip = |row: usize| ((x * m[row] + y * m[4 + row]) + z * m[8 + row]) + m[12 + row];
+            let r = f32x16::splat(s, 1.0) / clip(3);
+            let column = (clip(0) * r) * half_x + half_x;
+            let row = (clip(1) * r) * -half_y + half_y;
+            let depth = (clip(2) * r).max(zero).min(1.0) + 0.0;
+            let snap = |value: f32x16<S>, min: i32| -> i32x16<S> {
+                (value * 256.0).round_ties_even().to_int::<i32x16<S>>() - min * 256
+            };
+            let packed = snap(column, self.min[0]) | (snap(row, self.min[1]) << 16);
+            packed.bitcast::<u32x16<S>>().store_slice(&mut room.snapped[at..at + LANES]);
+            depth.store_slice(&mut room.depth[at..at + LANES]);
+        }
+    }
+
+    /// The stored id of a triangle of the cluster.
+    #[inline(always)]
+    fn id(&self, triangle: usize) -> u32 {
+        // Instance::new has seen that the sum fits.
+        self.instance.first_draw
+            + self.mesh.ranks[self.cluster.first_triangle as usize + triangle]
+            + 1
+    }
+
+    /// Depths of a triangle's corners, turned as its edges are.
+    #[inline(always)]
+    fn depths(&self, room: &Room, triangle: usize, turned: bool) -> [f32; 3] {
+        let place = self.cluster.first_triangle as usize + triangle;
+        let depth = |corner: usize| {
+            room.depth[usize::from(self.mesh.corners[corner][place]) % CLUSTER_VERTICES]
+        };
+        if turned { [depth(0), depth(2), depth(1)] } else { [depth(0), depth(1), depth(2)] }
+    }
+
+    /// Draws the triangles that [`set_up`] has prepared. Whether any sample was reached.
+    #[inline(always)]
+    fn samples<S: Simd>(
+        &self,
+        s: S,
+        region: &mut Region<'_>,
+        room: &mut Room,
+        from: usize,
+    ) -> bool {
+        let set_up = &room.set_up;
+        let mut lanes = set_up.single;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            lanes &= lanes - 1;
+            let triangle = room.kept[3][from + lane] as usize;
+            let z = self.depths(room, triangle, set_up.turned >> lane & 1 == 1);
+            let [column, row] = [0, 1].map(|axis| {
+                (set_up.first[axis][lane] + self.min[axis] - region.origin[axis]) as usize
+            });
+            let stored = &mut region.words[row * REGION + column];
+            if nearest(z) <= *stored {
+                let e = set_up.edges.map(|edges| edges[lane]);
+                let area = e[0] + e[1] + e[2];
+                let [e0, e1, e2] = e.map(f64::from);
+                let [z0, z1, z2] = z.map(f64::from);
+                let depth = (((e0 * z0 + e1 * z1) + e2 * z2) / f64::from(area)) as f32;
+                let word = i64::from(depth.to_bits()) << 32 | i64::from(self.id(triangle));
+                *stored = (*stored).min(word);
+            }
+        }
+        let mut lanes = set_up.several;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            lanes &= lanes - 1;
+            let triangle = room.kept[3][from + lane] as usize;
+            let z = self.depths(room, triangle, set_up.turned >> lane & 1 == 1);
+            self.several(s, region, set_up, lane, z, self.id(triangle));
+        }
+        set_up.single | set_up.several != 0
+    }
+
+    /// One triangle, eight columns of a row at a time.
+    #[inline(always)]
+    fn several<S: Simd>(
+        &self,
+        s: S,
+        region: &mut Region<'_>,
+        set_up: &SetUp,
+        lane: usize,
+        z: [f32; 3],
+        id: u32,
+    ) {
+        let local =
+            |axis: usize, pixel: i32| (pixel + self.min[axis] - region.origin[axis]) as usize;
+        let (x0, x1) = (local(0, set_up.first[0][lane]), local(0, set_up.last[0][lane]));
+        let (y0, y1) = (local(1, set_up.first[1][lane]), local(1, set_up.last[1][lane]));
+        let right = set_up.right.map(|right| right[lane]);
+        let down = set_up.down.map(|down| down[lane]);
+        let bias = set_up.bias.map(|bias| bias[lane]);
+        let at = set_up.edges.map(|edges| edges[lane]);
+        let area = f64::from(at[0] + at[1] + at[2]);
+        let nearest = i64x8::splat(s, nearest(z));
+        let z = z.map(f64::from);
+        let lane32 = i32x8::load_array(s, [0, 1, 2, 3, 4, 5, 6, 7]);
+        let lane64 = f64x8::load_array(s, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+        let along32 = [0, 1, 2].map(|i| lane32 * right[i] - bias[i]);
+        let along64 = [0, 1, 2].map(|i| lane64 * f64::from(right[i]));
+        for column in (x0..=x1).step_by(8) {
+            // Eight columns within the region; those before the box are outside the triangle.
+            let start = column.min(REGION - 8);
+            let shift = start as i32 - x0 as i32;
+            let mut e = [0, 1, 2].map(|i| at[i] + right[i] * shift);
+            for row in y0..=y1 {
+                let inside = (along32[0] + e[0]) | (along32[1] + e[1]) | (along32[2] + e[2]);
+                let covered = inside.simd_ge(0).to_bitmask();
+                if covered != 0 {
+                    let place = row * REGION + start;
+                    let words = &mut region.words[place..place + 8];
+                    let stored = i64x8::from_slice(s, words);
+                    let reached = covered & nearest.simd_le(stored).to_bitmask();
+                    if reached != 0 {
+                        let e = [0, 1, 2].map(|i| along64[i] + f64::from(e[i]));
+                        let word = depth_words(s, e, z, area, id);
+                        let lower =
+                            mask64x8::from_bitmask(s, reached).select(word.min(stored), stored);
+                        lower.store_slice(words);
+                    }
+                }
+                e = [e[0] + down[0], e[1] + down[1], e[2] + down[2]];
+            }
+        }
+    }
+}
+
+/// The word that no fragment of a triangle with these depths is below.
+#[inline(always)]
+pub(crate) fn nearest(z: [f32; 3]) -> i64 {
+    // Bits of non-negative floats order like the numbers.
+    let [a, b, c] = z.map(f32::to_bits);
+    i64::from(a.min(b).min(c)) << 32
+}
+
+/// The written depth at eight samples from their exact edge values, as words with `id`.
+#[inline(always)]
+pub(crate) fn depth_words<S: Simd>(
+    s: S,
+    e: [f64x8<S>; 3],
+    z: [f64; 3],
+    area: f64,
+    id: u32,
+) -> i64x8<S> {
+    let depth = ((e[0] * z[0] + e[1] * z[1]) + e[2] * z[2]) / area;
+    let bits: u32x16<S> = s.narrow_f64x8(depth, depth).bitcast();
+    u32x16::splat(s, id).zip_low(bits).bitcast()
+}
+
+/// Keeps the triangles whose box holds a sample of the region; how many. Columns and rows at once, as
+/// halves of words. `low` and `high` are the region's pixels.
+#[inline(always)]
+fn keep<S: Simd>(s: S, room: &mut Room, count: usize, low: [i32; 2], high: [i32; 2]) -> usize {
+    let halves = |[x, y]: [i32; 2]| -> i16x32<S> {
+        u32x16::splat(s, (x as u32 & 0xffff) | (y as u32) << 16).bitcast()
+    };
+    let (low, high) = (halves(low), halves(high));
+    let number = u32x16::load_array(s, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
+    let mut kept = 0;
+    for at in (0..count).step_by(LANES) {
+        let corners = [0, 1, 2].map(|i| u32x16::from_slice(s, &room.corners[i][at..at + LANES]));
+        let [a, b, c]: [i16x32<S>; 3] = corners.map(|corner| corner.bitcast());
+        // Centres are at 128, 384, …: the first at or after the least, the last at or before the most.
+        let first = ((a.min(b).min(c) + 127) >> 8).max(low);
+        let last = ((a.max(b).max(c) - 128) >> 8).min(high);
+        let signs: i32x16<S> = ((last - first) & i16::MIN).bitcast();
+        let holds = signs.simd_eq(0);
+        for (list, corner) in room.kept.iter_mut().zip(corners) {
+            corner.compress(holds).store_slice(&mut list[kept..kept + LANES]);
+        }
+        (number + at as u32).compress(holds).store_slice(&mut room.kept[3][kept..kept + LANES]);
+        kept += holds.to_bitmask().count_ones() as usize;
+    }
+    kept
+}
+
+/// Orientation, edge values at the first sample of the box, and their steps.
+#[inline(always)]
+fn set_up<S: Simd>(
+    s: S,
+    room: &mut Room,
+    from: usize,
+    lanes: u64,
+    faces: Faces,
+    low: [i32; 2],
+    high: [i32; 2],
+) {
+    let load = |i: usize| u32x16::from_slice(s, &room.kept[i][from..from + LANES]);
+    let column = |word: u32x16<S>| (word & 0xffff).bitcast::<i32x16<S>>();
+    let row = |word: u32x16<S>| (word >> 16).bitcast::<i32x16<S>>();
+    let [x0, x1, x2] = [0, 1, 2].map(|i| column(load(i)));
+    let [y0, y1, y2] = [0, 1, 2].map(|i| row(load(i)));
+    let signed = (x1 - x0) * (y2 - y0) - (y1 - y0) * (x2 - x0);
+    let turned = signed.simd_lt(0);
+    let area = signed.abs();
+    let (x1, x2) = (turned.select(x2, x1), turned.select(x1, x2));
+    let (y1, y2) = (turned.select(y2, y1), turned.select(y1, y2));
+    let live = match faces {
+        Faces::Both => !signed.simd_eq(0),
+        Faces::CounterClockwise => turned,
+    };
+    let first = |a: i32x16<S>, b: i32x16<S>, c: i32x16<S>, low: i32| {
+        ((a.min(b).min(c) + 127) >> 8).max(low)
+    };
+    let last = |a: i32x16<S>, b: i32x16<S>, c: i32x16<S>, high: i32| {
+        ((a.max(b).max(c) - 128) >> 8).min(high)
+    };
+    let (left, top) = (first(x0, x1, x2, low[0]), first(y0, y1, y2, low[1]));
+    let (right, bottom) = (last(x0, x1, x2, high[0]), last(y0, y1, y2, high[1]));
+    let (px, py) = ((left << 8) + 128, (top << 8) + 128);
+    let out = &mut room.set_up;
+    let mut edges = [i32x16::splat(s, 0); 3];
+    let mut inside = i32x16::splat(s, 0);
+    let ends = [(x1, y1, x2, y2), (x2, y2, x0, y0), (x0, y0, x1, y1)];
+    for (i, (ax, ay, bx, by)) in ends.into_iter().enumerate() {
+        let (dx, dy) = (bx - ax, by - ay);
+        // The three add up to the area.
+        edges[i] = if i < 2 { dx * (py - ay) - dy * (px - ax) } else { area - edges[0] - edges[1] };
+        let owns = dy.simd_lt(0) | (dy.simd_eq(0) & dx.simd_gt(0));
+        let bias = owns.select(i32x16::splat(s, 0), i32x16::splat(s, 1));
+        inside = inside | (edges[i] - bias);
+        edges[i].store_array(&mut out.edges[i]);
+        bias.store_array(&mut out.bias[i]);
+        (-(dy << 8)).store_array(&mut out.right[i]);
+        (dx << 8).store_array(&mut out.down[i]);
+    }
+    left.store_array(&mut out.first[0]);
+    top.store_array(&mut out.first[1]);
+    right.store_array(&mut out.last[0]);
+    bottom.store_array(&mut out.last[1]);
+    let one = left.simd_eq(right) & top.simd_eq(bottom);
+    let live = live.to_bitmask() & lanes;
+    out.turned = turned.to_bitmask();
+    out.single = live & (one & inside.simd_ge(0)).to_bitmask();
+    out.several = live & !one.to_bitmask();
+}

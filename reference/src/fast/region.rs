@@ -1,0 +1,141 @@
+//! One region of the image: everything that may show in it, front to back.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, i64x8};
+
+use super::bound::Place;
+use super::frame::{Frame, Unit};
+use super::narrow::{self, Job, Room};
+use super::{Work, wide};
+use crate::image::{BLOCK, BLOCKS, REGION, Region};
+
+/// Marks a triangle among the items of a unit; without it an item is a cluster.
+const WIDE: u32 = 1 << 31;
+
+/// Draws the units, whose keys (nearest depth, then number) are sorted, into the region.
+#[inline(always)]
+pub(crate) fn draw<S: Simd>(
+    s: S,
+    frame: &Frame<'_>,
+    keys: &[u64],
+    region: &mut Region<'_>,
+    room: &mut Room,
+) -> Work {
+    let mut work = Work::default();
+    let mut items = Vec::new();
+    let mut deepest = region.deepest(s);
+    for &key in keys {
+        let unit = &frame.units[key as u32 as usize];
+        if frame.skips && (unit.near > deepest || region.hidden(s, unit.min, unit.max, unit.near)) {
+            work.units_hidden += 1;
+            continue;
+        }
+        items.clear();
+        list(frame, unit, region, &mut items);
+        items.sort_unstable();
+        for &item in &items {
+            let near = (item >> 32) as u32;
+            let number = item as u32;
+            if number & WIDE != 0 {
+                let triangle = &unit.wide[(number & !WIDE) as usize];
+                if near <= deepest {
+                    wide::draw(s, triangle, region);
+                    deepest = region.deepest(s);
+                }
+                continue;
+            }
+            let Place::Narrow { min, max, near } = unit.places[number as usize] else { continue };
+            if frame.skips && (near > deepest || region.hidden(s, min, max, near)) {
+                work.clusters_hidden += 1;
+                continue;
+            }
+            let instance = &frame.instances[unit.instance as usize];
+            let cluster = instance.mesh.clusters[unit.first_cluster as usize + number as usize];
+            work.clusters += 1;
+            work.triangles += u64::from(cluster.triangles);
+            let min = min.map(i32::from);
+            let job = Job { mesh: instance.mesh, instance, cluster, half: frame.half, min };
+            narrow::draw(s, &job, region, room);
+        }
+        deepest = region.deepest(s);
+    }
+    region.renew_all(s);
+    work
+}
+
+/// Clusters and triangles of the unit that may show in the region, by nearest depth.
+fn list(frame: &Frame<'_>, unit: &Unit, region: &Region<'_>, items: &mut Vec<u64>) {
+    let _ = frame;
+    let meets = |min: [i16; 2], max: [i16; 2]| {
+        (0..2).all(|axis| {
+            i32::from(max[axis]) >= region.origin[axis]
+                && i32::from(min[axis]) < region.origin[axis] + region.size[axis]
+        })
+    };
+    for (i, place) in unit.places.iter().enumerate() {
+        if let Place::Narrow { min, max, near } = *place
+            && meets(min, max)
+        {
+            items.push(u64::from(near) << 32 | i as u64);
+        }
+    }
+    for (i, wide) in unit.wide.iter().enumerate() {
+        if meets(wide.min, wide.max) {
+            items.push(u64::from(wide.near()) << 32 | u64::from(WIDE) | i as u64);
+        }
+    }
+}
+
+impl Region<'_> {
+    /// Bits of a depth that no sample lies behind.
+    #[inline(always)]
+    fn deepest<S: Simd>(&self, _: S) -> u32 {
+        self.far.iter().copied().fold(0, u32::max)
+    }
+
+    /// Makes the bound of a block its farthest depth.
+    #[inline(always)]
+    pub(crate) fn renew<S: Simd>(&mut self, s: S, block: usize) {
+        let first = block / BLOCKS * BLOCK * REGION + block % BLOCKS * BLOCK;
+        let mut most = i64x8::splat(s, 0);
+        for line in 0..BLOCK {
+            let place = first + line * REGION;
+            most = most.max(i64x8::from_slice(s, &self.words[place..place + BLOCK]));
+        }
+        self.far[block] = (most.reduce_max() >> 32) as u32;
+        self.stale[block] = false;
+    }
+
+    #[inline(always)]
+    fn renew_all<S: Simd>(&mut self, s: S) {
+        for block in 0..BLOCKS * BLOCKS {
+            if self.stale[block] {
+                self.renew(s, block);
+            }
+        }
+    }
+
+    /// Whether nothing at depth `near` or behind shows on the pixels from `min` to `max`.
+    #[inline(always)]
+    fn hidden<S: Simd>(&mut self, s: S, min: [i16; 2], max: [i16; 2], near: u32) -> bool {
+        let block = |axis: usize, pixel: i16| {
+            (i32::from(pixel) - self.origin[axis]).clamp(0, REGION as i32 - 1) as usize / BLOCK
+        };
+        let (x0, x1) = (block(0, min[0]), block(0, max[0]));
+        let (y0, y1) = (block(1, min[1]), block(1, max[1]));
+        for row in y0..=y1 {
+            for block in row * BLOCKS + x0..=row * BLOCKS + x1 {
+                if near <= self.far[block] {
+                    if !self.stale[block] {
+                        return false;
+                    }
+                    self.renew(s, block);
+                    if near <= self.far[block] {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+}

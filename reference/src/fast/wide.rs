@@ -1,0 +1,211 @@
+//! Triangles of any size, already clipped and snapped, block by block.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f64x8, i32x8, i64x8, mask64x8};
+
+use super::narrow::{depth_words, nearest};
+use crate::image::{BLOCK, BLOCKS, REGION, Region, Viewport};
+use crate::window::{Oriented, SUBPIXELS, edge, top_left};
+
+/// A triangle that covers at least the box of a sample.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wide {
+    pub(crate) triangle: Oriented,
+    /// Draw index plus one.
+    pub(crate) id: u32,
+    /// First and last columns and rows whose centres are within the bounding box and the image.
+    pub(crate) min: [i16; 2],
+    pub(crate) max: [i16; 2],
+}
+
+/// An edge value beyond ±this has the same sign all over a block: from one sample of a block to another
+/// it changes by at most 7·(2²⁴ + 2²⁴) < 2²⁸, sub-pixel bits dropped.
+const SATURATED: i64 = 1 << 29;
+/// The plane of a triangle's depth, evaluated in f64, is within this much times its scale of the exact
+/// one: each of its terms takes at most five roundings and the two sums four, so 9·2⁻⁵³ of the sum of
+/// the terms' sizes, and the written depth before its rounding to f32 is within 5·2⁻⁵³; 2⁻⁴⁹ is 16·2⁻⁵³.
+const PLANE_ERROR: f64 = 1.0 / (1_u64 << 49) as f64;
+
+impl Wide {
+    /// `None` where the box holds no sample of the image.
+    pub(crate) fn new(triangle: Oriented, id: u32, viewport: Viewport) -> Option<Self> {
+        let half = SUBPIXELS as i32 / 2;
+        let span = |a: i32, b: i32, c: i32, side: u32| {
+            // First and last centre (column·256 + 128) within the box: ceiling and floor.
+            let first = (a.min(b).min(c) - half + 255) >> 8;
+            let last = (a.max(b).max(c) - half) >> 8;
+            (first.max(0), last.min(side as i32 - 1))
+        };
+        let [a, b, c] = triangle.v;
+        let (x0, x1) = span(a.x, b.x, c.x, viewport.width);
+        let (y0, y1) = span(a.y, b.y, c.y, viewport.height);
+        // Viewports end before 2¹⁵.
+        let pixel = |x: i32, y: i32| [x as i16, y as i16];
+        (x0 <= x1 && y0 <= y1).then(|| Self {
+            triangle,
+            id,
+            min: pixel(x0, y0),
+            max: pixel(x1, y1),
+        })
+    }
+
+    /// Bits of a depth that no fragment is nearer than.
+    pub(crate) fn near(&self) -> u32 {
+        (nearest(self.triangle.v.map(|v| v.z)) >> 32) as u32
+    }
+}
+
+/// One edge against samples, counted from the first sample of a region.
+#[derive(Clone, Copy)]
+struct Edge {
+    /// ⌊(e − bias) / 256⌋, of the same sign as e − bias: the samples' steps are whole multiples of 256.
+    value: i64,
+    /// Its change from a column to the next, and from a row to the next.
+    right: i64,
+    down: i64,
+    /// The edge value itself, unbiased; exact.
+    exact: f64,
+}
+
+impl Edge {
+    fn new(triangle: &Oriented, i: usize, origin: [i32; 2]) -> Self {
+        let (a, b) = (triangle.v[(i + 1) % 3], triangle.v[(i + 2) % 3]);
+        let [x, y] = origin.map(|pixel| i64::from(pixel) * SUBPIXELS + SUBPIXELS / 2);
+        let exact = edge(a, b, x, y);
+        let biased = exact - i64::from(!top_left(a, b));
+        Self {
+            value: biased >> 8,
+            right: i64::from(a.y) - i64::from(b.y),
+            down: i64::from(b.x) - i64::from(a.x),
+            exact: exact as f64,
+        }
+    }
+
+    fn at(&self, [x, y]: [i64; 2]) -> i64 {
+        self.value + self.right * x + self.down * y
+    }
+
+    fn exact_at(&self, [x, y]: [i64; 2]) -> f64 {
+        self.exact + (SUBPIXELS * (self.right * x + self.down * y)) as f64
+    }
+
+    /// The most that the value rises within a block.
+    fn rise(&self) -> i64 {
+        (BLOCK as i64 - 1) * (self.right.max(0) + self.down.max(0))
+    }
+}
+
+/// A lower bound of a triangle's depths over a block: its plane, less the plane's error.
+struct Plane {
+    /// At the nearest sample of the region's first block.
+    depth: f64,
+    right: f64,
+    down: f64,
+}
+
+impl Plane {
+    /// Differences of depths keep the terms small: the three edge values add up to the area, so
+    /// z = z₀ + (e₁·(z₁ − z₀) + e₂·(z₂ − z₀)) / area.
+    fn new(triangle: &Oriented, edges: &[Edge; 3]) -> Self {
+        let area = triangle.area as f64;
+        let [z0, z1, z2] = triangle.v.map(|v| f64::from(v.z));
+        let (d1, d2) = (z1 - z0, z2 - z0);
+        let step = |along: fn(&Edge) -> f64| {
+            let (a, b) = (along(&edges[1]) * d1 / area, along(&edges[2]) * d2 / area);
+            (a + b, a.abs() + b.abs())
+        };
+        let (right, right_size) = step(|edge| (SUBPIXELS * edge.right) as f64);
+        let (down, down_size) = step(|edge| (SUBPIXELS * edge.down) as f64);
+        let (depth, size) = step(|edge| edge.exact);
+        let scale = 1.0 + size + REGION as f64 * (right_size + down_size);
+        let last = (BLOCK - 1) as f64;
+        Self {
+            depth: z0 + depth + last * (right.min(0.0) + down.min(0.0)) - PLANE_ERROR * scale,
+            right,
+            down,
+        }
+    }
+
+    /// Whether every fragment in the block is strictly behind `far`. The exact depth is at least the
+    /// bound, so where that is not below the f32 after `far`, neither is any depth rounded to f32.
+    fn hidden(&self, [x, y]: [i64; 2], far: u32) -> bool {
+        let bound = self.depth + self.right * x as f64 + self.down * y as f64;
+        bound >= f64::from(f32::from_bits(far + 1))
+    }
+}
+
+/// Draws one triangle into one region.
+#[inline(always)]
+pub(crate) fn draw<S: Simd>(s: S, wide: &Wide, region: &mut Region<'_>) {
+    let triangle = &wide.triangle;
+    let block = |axis: usize, pixel: i16| {
+        (i32::from(pixel) - region.origin[axis]).clamp(0, REGION as i32 - 1) as usize / BLOCK
+    };
+    let (x0, x1) = (block(0, wide.min[0]), block(0, wide.max[0]));
+    let (y0, y1) = (block(1, wide.min[1]), block(1, wide.max[1]));
+    let edges = [0, 1, 2].map(|i| Edge::new(triangle, i, region.origin));
+    let plane = Plane::new(triangle, &edges);
+    let near = wide.near();
+    let rise = edges.map(|edge| edge.rise());
+    for row in y0..=y1 {
+        for column in x0..=x1 {
+            let place = [(column * BLOCK) as i64, (row * BLOCK) as i64];
+            let value = edges.map(|edge| edge.at(place));
+            if (0..3).any(|i| value[i] + rise[i] < 0) {
+                continue;
+            }
+            let far = region.far[row * BLOCKS + column];
+            if near > far || plane.hidden(place, far) {
+                continue;
+            }
+            if samples(s, wide, region, &edges, [column, row]) {
+                region.renew(s, row * BLOCKS + column);
+            }
+        }
+    }
+}
+
+/// Draws the triangle into one block; whether it reached any sample.
+#[inline(always)]
+fn samples<S: Simd>(
+    s: S,
+    wide: &Wide,
+    region: &mut Region<'_>,
+    edges: &[Edge; 3],
+    [column, row]: [usize; 2],
+) -> bool {
+    let place = [(column * BLOCK) as i64, (row * BLOCK) as i64];
+    let lane32 = i32x8::load_array(s, [0, 1, 2, 3, 4, 5, 6, 7]);
+    let lane64 = f64x8::load_array(s, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+    // Differences of snapped coordinates are within 2²⁴.
+    let mut value = edges.map(|edge| {
+        let first = edge.at(place).clamp(-SATURATED, SATURATED) as i32;
+        lane32 * edge.right as i32 + first
+    });
+    let down = edges.map(|edge| edge.down as i32);
+    let z = wide.triangle.v.map(|v| v.z);
+    let nearest = i64x8::splat(s, nearest(z));
+    let z = z.map(f64::from);
+    let area = wide.triangle.area as f64;
+    let along = edges.map(|edge| lane64 * (SUBPIXELS * edge.right) as f64);
+    let mut any = false;
+    for line in 0..BLOCK {
+        let covered = (value[0] | value[1] | value[2]).simd_ge(0).to_bitmask();
+        if covered != 0 {
+            let start = (row * BLOCK + line) * REGION + column * BLOCK;
+            let words = &mut region.words[start..start + BLOCK];
+            let stored = i64x8::from_slice(s, words);
+            let reached = covered & nearest.simd_le(stored).to_bitmask();
+            if reached != 0 {
+                let at = [place[0], place[1] + line as i64];
+                let e = [0, 1, 2].map(|i| along[i] + edges[i].exact_at(at));
+                let word = depth_words(s, e, z, area, wide.id);
+                let lower = mask64x8::from_bitmask(s, reached).select(word.min(stored), stored);
+                lower.store_slice(words);
+                any = true;
+            }
+        }
+        value = [value[0] + down[0], value[1] + down[1], value[2] + down[2]];
+    }
+    any
+}
