@@ -13,6 +13,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 
+use super::inlined;
 use super::mesh::Mesh;
 use crate::image::Viewport;
 
@@ -79,23 +80,35 @@ impl Projection {
     /// Every comparison is written so that a coordinate that is no number ends in [`Place::Wide`].
     #[inline(always)]
     pub(crate) fn clusters<S: Simd>(&self, s: S, mesh: &Mesh, first: usize) -> [Place; 16] {
-        let load = |i: usize| f32x16::from_slice(s, &mesh.boxes[i][first..first + 16]);
+        let load = inlined(
+            #[inline(always)]
+            |i: usize| f32x16::from_slice(s, &mesh.boxes[i][first..first + 16]),
+        );
         let [ex, ey, ez, ew] = self.error;
         let mut seen = Extremes::new(s);
-        let terms = |axis: usize, row: usize, high: usize| {
-            load(axis + 3 * high) * self.matrix[4 * axis + row]
-        };
+        let terms = inlined(
+            #[inline(always)]
+            |axis: usize, row: usize, high: usize| {
+                load(axis + 3 * high) * self.matrix[4 * axis + row]
+            },
+        );
         // The eight corners, each coordinate in the written order.
         for corner in 0..8 {
-            let clip: [f32x16<S>; 4] = std::array::from_fn(|row| {
-                let [x, y, z] = [0, 1, 2].map(|axis| terms(axis, row, corner >> axis & 1));
-                ((x + y) + z) + self.matrix[12 + row]
-            });
-            seen.add(clip);
+            let clip = inlined(
+                #[inline(always)]
+                |row: usize| {
+                    let [x, y, z] = three!(axis => terms(axis, row, corner >> axis & 1));
+                    ((x + y) + z) + self.matrix[12 + row]
+                },
+            );
+            seen.add([clip(0), clip(1), clip(2), clip(3)]);
         }
         let zero = f32x16::splat(s, 0.0);
         // Distances to the six planes over the corners: all beyond one of them?
-        let beyond = |highest: f32x16<S>, error: f32| highest.simd_lt(-OUTSIDE * error);
+        let beyond = inlined(
+            #[inline(always)]
+            |highest: f32x16<S>, error: f32| highest.simd_lt(-OUTSIDE * error),
+        );
         let outside = beyond(seen.high_z, ez)
             | beyond(seen.high_far, ez + ew)
             | beyond(seen.high_left, ex + ew)
@@ -110,15 +123,23 @@ impl Projection {
         // to the quotient (reciprocal, product, scaling, and the corner's division), and for columns and
         // rows one of the offset and half a sub-pixel.
         let unit = UNIT as f32;
-        let spread =
-            |most: f32x16<S>, error: f32| (most * ew + error) / least_w + most * (8.0 * unit);
-        let most = |low: f32x16<S>, high: f32x16<S>| low.abs().max(high.abs());
-        let span = |low: f32x16<S>, high: f32x16<S>, error: f32, half: f32, flip: f32| {
-            let spread = spread(most(low, high), error) * (2.0 * half)
-                + (4.0 * unit * half + 2.0 * unit * half + 1.0 / 256.0);
-            let (a, b) = (low * (half * flip) + half, high * (half * flip) + half);
-            ((a.min(b) - spread).floor(), (a.max(b) + spread).floor())
-        };
+        let spread = inlined(
+            #[inline(always)]
+            |most: f32x16<S>, error: f32| (most * ew + error) / least_w + most * (8.0 * unit),
+        );
+        let most = inlined(
+            #[inline(always)]
+            |low: f32x16<S>, high: f32x16<S>| low.abs().max(high.abs()),
+        );
+        let span = inlined(
+            #[inline(always)]
+            |low: f32x16<S>, high: f32x16<S>, error: f32, half: f32, flip: f32| {
+                let spread = spread(most(low, high), error) * (2.0 * half)
+                    + (4.0 * unit * half + 2.0 * unit * half + 1.0 / 256.0);
+                let (a, b) = (low * (half * flip) + half, high * (half * flip) + half);
+                ((a.min(b) - spread).floor(), (a.max(b) + spread).floor())
+            },
+        );
         let (x0, x1) = span(seen.low_x, seen.high_x, ex, self.half[0], 1.0);
         let (y0, y1) = span(seen.low_y, seen.high_y, ey, self.half[1], -1.0);
         let aside =
@@ -140,7 +161,9 @@ impl Projection {
         near: f32x16<S>,
     ) -> [Place; 16] {
         let (outside, narrow) = (outside.to_bitmask(), narrow.to_bitmask());
-        let [x0, y0, x1, y1] = spans.map(|span| span.to_array());
+        let [x0, y0, x1, y1] = spans;
+        let (x0, y0) = (x0.to_array(), y0.to_array());
+        let (x1, y1) = (x1.to_array(), y1.to_array());
         let near = near.to_array();
         std::array::from_fn(|i| {
             if outside >> i & 1 == 1 {
@@ -203,10 +226,13 @@ impl<S: Simd> Extremes<S> {
 
     #[inline(always)]
     fn add(&mut self, [x, y, z, w]: [f32x16<S>; 4]) {
-        let keep = |low: &mut f32x16<S>, high: &mut f32x16<S>, value: f32x16<S>| {
-            *low = low.min(value);
-            *high = high.max(value);
-        };
+        let keep = inlined(
+            #[inline(always)]
+            |low: &mut f32x16<S>, high: &mut f32x16<S>, value: f32x16<S>| {
+                *low = low.min(value);
+                *high = high.max(value);
+            },
+        );
         keep(&mut self.low_x, &mut self.high_x, x / w);
         keep(&mut self.low_y, &mut self.high_y, y / w);
         keep(&mut self.low_depth, &mut self.high_depth, z / w);

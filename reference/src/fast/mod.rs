@@ -1,5 +1,33 @@
 //! The renderer that runs use: equal to [`crate::naive`] bit for bit.
 
+/// The three values of an expression for `i` = 0, 1, 2. An array's `map` and `from_fn` are calls, and a
+/// call to a function compiled without the vector instructions passes vectors through memory.
+macro_rules! three {
+    ($i:ident => $value:expr) => {
+        [
+            {
+                let $i = 0_usize;
+                $value
+            },
+            {
+                let $i = 1_usize;
+                $value
+            },
+            {
+                let $i = 2_usize;
+                $value
+            },
+        ]
+    };
+}
+
+/// A closure as it is: the place where stable Rust lets a closure be marked for inlining, which it must
+/// be for the reason of [`three`].
+#[inline(always)]
+fn inlined<F>(closure: F) -> F {
+    closure
+}
+
 mod bound;
 mod count;
 mod frame;

@@ -9,7 +9,7 @@ use fearless_simd::{Simd, f32x16, f64x8, i16x32, i32x8, i32x16, i64x8, mask64x8,
 
 use super::level::LANES;
 use super::mesh::{CLUSTER_VERTICES, Cluster, Mesh};
-use super::{Instance, lookup};
+use super::{Instance, inlined, lookup};
 use crate::draw::Faces;
 use crate::image::{BLOCK, BLOCKS, REGION, Region};
 
@@ -124,18 +124,25 @@ impl Job<'_> {
         let zero = f32x16::splat(s, 0.0);
         let [half_x, half_y] = self.half;
         for at in (0..usize::from(self.cluster.vertices)).step_by(LANES) {
-            let [x, y, z] = [0, 1, 2].map(|axis| {
-                let from = first + at;
-                f32x16::from_slice(s, &self.mesh.positions[axis][from..from + LANES])
-            });
-            let clip = |row: usize| ((x * m[row] + y * m[4 + row]) + z * m[8 + row]) + m[12 + row];
+            let from = first + at;
+            let [x, y, z] = three!(axis => f32x16::from_slice(
+                s,
+                &self.mesh.positions[axis][from..from + LANES],
+            ));
+            let clip = inlined(
+                #[inline(always)]
+                |row: usize| ((x * m[row] + y * m[4 + row]) + z * m[8 + row]) + m[12 + row],
+            );
             let r = f32x16::splat(s, 1.0) / clip(3);
             let column = (clip(0) * r) * half_x + half_x;
             let row = (clip(1) * r) * -half_y + half_y;
             let depth = (clip(2) * r).max(zero).min(1.0) + 0.0;
-            let snap = |value: f32x16<S>, min: i32| -> i32x16<S> {
-                (value * 256.0).round_ties_even().to_int::<i32x16<S>>() - min * 256
-            };
+            let snap = inlined(
+                #[inline(always)]
+                |value: f32x16<S>, min: i32| -> i32x16<S> {
+                    (value * 256.0).round_ties_even().to_int::<i32x16<S>>() - min * 256
+                },
+            );
             let packed = snap(column, self.min[0]) | (snap(row, self.min[1]) << 16);
             packed.bitcast::<u32x16<S>>().store_slice(&mut room.snapped[at..at + LANES]);
             depth.store_slice(&mut room.depth[at..at + LANES]);
@@ -155,9 +162,12 @@ impl Job<'_> {
     #[inline(always)]
     fn depths(&self, room: &Room, triangle: usize, turned: bool) -> [f32; 3] {
         let place = self.cluster.first_triangle as usize + triangle;
-        let depth = |corner: usize| {
-            room.depth[usize::from(self.mesh.corners[corner][place]) % CLUSTER_VERTICES]
-        };
+        let depth = inlined(
+            #[inline(always)]
+            |corner: usize| {
+                room.depth[usize::from(self.mesh.corners[corner][place]) % CLUSTER_VERTICES]
+            },
+        );
         if turned { [depth(0), depth(2), depth(1)] } else { [depth(0), depth(1), depth(2)] }
     }
 
@@ -177,15 +187,15 @@ impl Job<'_> {
             lanes &= lanes - 1;
             let triangle = room.kept[3][from + lane] as usize;
             let z = self.depths(room, triangle, set_up.turned >> lane & 1 == 1);
-            let [column, row] = [0, 1].map(|axis| {
-                (set_up.first[axis][lane] + self.min[axis] - region.origin[axis]) as usize
-            });
+            let column = set_up.first[0][lane] + self.min[0] - region.origin[0];
+            let row = set_up.first[1][lane] + self.min[1] - region.origin[1];
+            let (column, row) = (column as usize, row as usize);
             let stored = &mut region.words[row * REGION + column];
             if nearest(z) <= *stored {
-                let e = set_up.edges.map(|edges| edges[lane]);
+                let e = three!(i => set_up.edges[i][lane]);
                 let area = e[0] + e[1] + e[2];
-                let [e0, e1, e2] = e.map(f64::from);
-                let [z0, z1, z2] = z.map(f64::from);
+                let [e0, e1, e2] = three!(i => f64::from(e[i]));
+                let [z0, z1, z2] = three!(i => f64::from(z[i]));
                 let depth = (((e0 * z0 + e1 * z1) + e2 * z2) / f64::from(area)) as f32;
                 let word = i64::from(depth.to_bits()) << 32 | i64::from(self.id(triangle));
                 *stored = (*stored).min(word);
@@ -213,26 +223,28 @@ impl Job<'_> {
         z: [f32; 3],
         id: u32,
     ) {
-        let local =
-            |axis: usize, pixel: i32| (pixel + self.min[axis] - region.origin[axis]) as usize;
+        let local = inlined(
+            #[inline(always)]
+            |axis: usize, pixel: i32| (pixel + self.min[axis] - region.origin[axis]) as usize,
+        );
         let (x0, x1) = (local(0, set_up.first[0][lane]), local(0, set_up.last[0][lane]));
         let (y0, y1) = (local(1, set_up.first[1][lane]), local(1, set_up.last[1][lane]));
-        let right = set_up.right.map(|right| right[lane]);
-        let down = set_up.down.map(|down| down[lane]);
-        let bias = set_up.bias.map(|bias| bias[lane]);
-        let at = set_up.edges.map(|edges| edges[lane]);
+        let right = three!(i => set_up.right[i][lane]);
+        let down = three!(i => set_up.down[i][lane]);
+        let bias = three!(i => set_up.bias[i][lane]);
+        let at = three!(i => set_up.edges[i][lane]);
         let area = f64::from(at[0] + at[1] + at[2]);
         let nearest = i64x8::splat(s, nearest(z));
-        let z = z.map(f64::from);
+        let z = three!(i => f64::from(z[i]));
         let lane32 = i32x8::load_array(s, [0, 1, 2, 3, 4, 5, 6, 7]);
         let lane64 = f64x8::load_array(s, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
-        let along32 = [0, 1, 2].map(|i| lane32 * right[i] - bias[i]);
-        let along64 = [0, 1, 2].map(|i| lane64 * f64::from(right[i]));
+        let along32 = three!(i => lane32 * right[i] - bias[i]);
+        let along64 = three!(i => lane64 * f64::from(right[i]));
         for column in (x0..=x1).step_by(8) {
             // Eight columns within the region; those before the box are outside the triangle.
             let start = column.min(REGION - 8);
             let shift = start as i32 - x0 as i32;
-            let mut e = [0, 1, 2].map(|i| at[i] + right[i] * shift);
+            let mut e = three!(i => at[i] + right[i] * shift);
             for row in y0..=y1 {
                 let inside = (along32[0] + e[0]) | (along32[1] + e[1]) | (along32[2] + e[2]);
                 let covered = inside.simd_ge(0).to_bitmask();
@@ -242,7 +254,7 @@ impl Job<'_> {
                     let stored = i64x8::from_slice(s, words);
                     let reached = covered & nearest.simd_le(stored).to_bitmask();
                     if reached != 0 {
-                        let e = [0, 1, 2].map(|i| along64[i] + f64::from(e[i]));
+                        let e = three!(i => along64[i] + f64::from(e[i]));
                         let word = depth_words(s, e, z, area, id);
                         let lower =
                             mask64x8::from_bitmask(s, reached).select(word.min(stored), stored);
@@ -259,7 +271,7 @@ impl Job<'_> {
 #[inline(always)]
 pub(crate) fn nearest(z: [f32; 3]) -> i64 {
     // Bits of non-negative floats order like the numbers.
-    let [a, b, c] = z.map(f32::to_bits);
+    let [a, b, c] = three!(i => z[i].to_bits());
     i64::from(a.min(b).min(c)) << 32
 }
 
@@ -281,15 +293,18 @@ pub(crate) fn depth_words<S: Simd>(
 /// halves of words. `low` and `high` are the region's pixels.
 #[inline(always)]
 fn keep<S: Simd>(s: S, room: &mut Room, count: usize, low: [i32; 2], high: [i32; 2]) -> usize {
-    let halves = |[x, y]: [i32; 2]| -> i16x32<S> {
-        u32x16::splat(s, (x as u32 & 0xffff) | (y as u32) << 16).bitcast()
-    };
+    let halves = inlined(
+        #[inline(always)]
+        |[x, y]: [i32; 2]| -> i16x32<S> {
+            u32x16::splat(s, (x as u32 & 0xffff) | (y as u32) << 16).bitcast()
+        },
+    );
     let (low, high) = (halves(low), halves(high));
     let number = u32x16::load_array(s, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
     let mut kept = 0;
     for at in (0..count).step_by(LANES) {
-        let corners = [0, 1, 2].map(|i| u32x16::from_slice(s, &room.corners[i][at..at + LANES]));
-        let [a, b, c]: [i16x32<S>; 3] = corners.map(|corner| corner.bitcast());
+        let corners = three!(i => u32x16::from_slice(s, &room.corners[i][at..at + LANES]));
+        let [a, b, c]: [i16x32<S>; 3] = three!(i => corners[i].bitcast());
         // Centres are at 128, 384, …: the first at or after the least, the last at or before the most.
         let first = ((a.min(b).min(c) + 127) >> 8).max(low);
         let last = ((a.max(b).max(c) - 128) >> 8).min(high);
@@ -315,11 +330,20 @@ fn set_up<S: Simd>(
     low: [i32; 2],
     high: [i32; 2],
 ) {
-    let load = |i: usize| u32x16::from_slice(s, &room.kept[i][from..from + LANES]);
-    let column = |word: u32x16<S>| (word & 0xffff).bitcast::<i32x16<S>>();
-    let row = |word: u32x16<S>| (word >> 16).bitcast::<i32x16<S>>();
-    let [x0, x1, x2] = [0, 1, 2].map(|i| column(load(i)));
-    let [y0, y1, y2] = [0, 1, 2].map(|i| row(load(i)));
+    let load = inlined(
+        #[inline(always)]
+        |i: usize| u32x16::from_slice(s, &room.kept[i][from..from + LANES]),
+    );
+    let column = inlined(
+        #[inline(always)]
+        |word: u32x16<S>| (word & 0xffff).bitcast::<i32x16<S>>(),
+    );
+    let row = inlined(
+        #[inline(always)]
+        |word: u32x16<S>| (word >> 16).bitcast::<i32x16<S>>(),
+    );
+    let [x0, x1, x2] = three!(i => column(load(i)));
+    let [y0, y1, y2] = three!(i => row(load(i)));
     let signed = (x1 - x0) * (y2 - y0) - (y1 - y0) * (x2 - x0);
     let turned = signed.simd_lt(0);
     let area = signed.abs();
@@ -329,12 +353,18 @@ fn set_up<S: Simd>(
         Faces::Both => !signed.simd_eq(0),
         Faces::CounterClockwise => turned,
     };
-    let first = |a: i32x16<S>, b: i32x16<S>, c: i32x16<S>, low: i32| {
-        ((a.min(b).min(c) + 127) >> 8).max(low)
-    };
-    let last = |a: i32x16<S>, b: i32x16<S>, c: i32x16<S>, high: i32| {
-        ((a.max(b).max(c) - 128) >> 8).min(high)
-    };
+    let first = inlined(
+        #[inline(always)]
+        |a: i32x16<S>, b: i32x16<S>, c: i32x16<S>, low: i32| {
+            ((a.min(b).min(c) + 127) >> 8).max(low)
+        },
+    );
+    let last = inlined(
+        #[inline(always)]
+        |a: i32x16<S>, b: i32x16<S>, c: i32x16<S>, high: i32| {
+            ((a.max(b).max(c) - 128) >> 8).min(high)
+        },
+    );
     let (left, top) = (first(x0, x1, x2, low[0]), first(y0, y1, y2, low[1]));
     let (right, bottom) = (last(x0, x1, x2, high[0]), last(y0, y1, y2, high[1]));
     let (px, py) = ((left << 8) + 128, (top << 8) + 128);
@@ -342,7 +372,8 @@ fn set_up<S: Simd>(
     let mut edges = [i32x16::splat(s, 0); 3];
     let mut inside = i32x16::splat(s, 0);
     let ends = [(x1, y1, x2, y2), (x2, y2, x0, y0), (x0, y0, x1, y1)];
-    for (i, (ax, ay, bx, by)) in ends.into_iter().enumerate() {
+    for i in 0..3 {
+        let (ax, ay, bx, by) = ends[i];
         let (dx, dy) = (bx - ax, by - ay);
         // The three add up to the area.
         edges[i] = if i < 2 { dx * (py - ay) - dy * (px - ax) } else { area - edges[0] - edges[1] };

@@ -51,7 +51,7 @@ impl Wide {
 
     /// Bits of a depth that no fragment is nearer than.
     pub(crate) fn near(&self) -> u32 {
-        (nearest(self.triangle.v.map(|v| v.z)) >> 32) as u32
+        (nearest(three!(i => self.triangle.v[i].z)) >> 32) as u32
     }
 }
 
@@ -108,7 +108,7 @@ impl Plane {
     /// z = z₀ + (e₁·(z₁ − z₀) + e₂·(z₂ − z₀)) / area.
     fn new(triangle: &Oriented, edges: &[Edge; 3]) -> Self {
         let area = triangle.area as f64;
-        let [z0, z1, z2] = triangle.v.map(|v| f64::from(v.z));
+        let [z0, z1, z2] = three!(i => f64::from(triangle.v[i].z));
         let (d1, d2) = (z1 - z0, z2 - z0);
         let step = |along: fn(&Edge) -> f64| {
             let (a, b) = (along(&edges[1]) * d1 / area, along(&edges[2]) * d2 / area);
@@ -143,15 +143,15 @@ pub(crate) fn draw<S: Simd>(s: S, wide: &Wide, region: &mut Region<'_>) {
     };
     let (x0, x1) = (block(0, wide.min[0]), block(0, wide.max[0]));
     let (y0, y1) = (block(1, wide.min[1]), block(1, wide.max[1]));
-    let edges = [0, 1, 2].map(|i| Edge::new(triangle, i, region.origin));
+    let edges = three!(i => Edge::new(triangle, i, region.origin));
     let plane = Plane::new(triangle, &edges);
     let near = wide.near();
-    let rise = edges.map(|edge| edge.rise());
+    let rise = three!(i => edges[i].rise());
     for row in y0..=y1 {
         for column in x0..=x1 {
             let place = [(column * BLOCK) as i64, (row * BLOCK) as i64];
-            let value = edges.map(|edge| edge.at(place));
-            if (0..3).any(|i| value[i] + rise[i] < 0) {
+            let [a, b, c] = three!(i => edges[i].at(place) + rise[i]);
+            if a | b | c < 0 {
                 continue;
             }
             let far = region.far[row * BLOCKS + column];
@@ -178,16 +178,16 @@ fn samples<S: Simd>(
     let lane32 = i32x8::load_array(s, [0, 1, 2, 3, 4, 5, 6, 7]);
     let lane64 = f64x8::load_array(s, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
     // Differences of snapped coordinates are within 2²⁴.
-    let mut value = edges.map(|edge| {
-        let first = edge.at(place).clamp(-SATURATED, SATURATED) as i32;
-        lane32 * edge.right as i32 + first
+    let mut value = three!(i => {
+        let first = edges[i].at(place).clamp(-SATURATED, SATURATED) as i32;
+        lane32 * edges[i].right as i32 + first
     });
-    let down = edges.map(|edge| edge.down as i32);
-    let z = wide.triangle.v.map(|v| v.z);
+    let down = three!(i => edges[i].down as i32);
+    let z = three!(i => wide.triangle.v[i].z);
     let nearest = i64x8::splat(s, nearest(z));
-    let z = z.map(f64::from);
+    let z = three!(i => f64::from(z[i]));
     let area = wide.triangle.area as f64;
-    let along = edges.map(|edge| lane64 * (SUBPIXELS * edge.right) as f64);
+    let along = three!(i => lane64 * (SUBPIXELS * edges[i].right) as f64);
     let mut any = false;
     for line in 0..BLOCK {
         let covered = (value[0] | value[1] | value[2]).simd_ge(0).to_bitmask();
@@ -198,7 +198,7 @@ fn samples<S: Simd>(
             let reached = covered & nearest.simd_le(stored).to_bitmask();
             if reached != 0 {
                 let at = [place[0], place[1] + line as i64];
-                let e = [0, 1, 2].map(|i| along[i] + edges[i].exact_at(at));
+                let e = three!(i => along[i] + edges[i].exact_at(at));
                 let word = depth_words(s, e, z, area, wide.id);
                 let lower = mask64x8::from_bitmask(s, reached).select(word.min(stored), stored);
                 lower.store_slice(words);
