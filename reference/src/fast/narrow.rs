@@ -41,10 +41,11 @@ struct SetUp {
     first: [[i32; LANES]; 2],
     last: [[i32; LANES]; 2],
     turned: u64,
-    /// One sample, and covered.
-    single: u64,
-    /// More than one sample.
-    several: u64,
+    /// Lanes whose box is at most two columns by two rows, and is covered: at its first sample, sixteen
+    /// bits further at the sample to the right, then at those below.
+    tiny: u64,
+    /// Lanes with a larger box.
+    larger: u64,
 }
 
 impl Room {
@@ -63,8 +64,8 @@ impl Room {
                 first: [none; 2],
                 last: [none; 2],
                 turned: 0,
-                single: 0,
-                several: 0,
+                tiny: 0,
+                larger: 0,
             },
         }
     }
@@ -181,40 +182,49 @@ impl Job<'_> {
         from: usize,
     ) -> bool {
         let set_up = &room.set_up;
-        let mut lanes = set_up.single;
+        let mut samples = set_up.tiny;
+        while samples != 0 {
+            let bit = samples.trailing_zeros() as usize;
+            samples &= samples - 1;
+            self.sample(region, room, from, bit % LANES, bit / LANES);
+        }
+        let mut lanes = set_up.larger;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
             let triangle = room.kept[3][from + lane] as usize;
             let z = self.depths(room, triangle, set_up.turned >> lane & 1 == 1);
-            let column = set_up.first[0][lane] + self.min[0] - region.origin[0];
-            let row = set_up.first[1][lane] + self.min[1] - region.origin[1];
-            let (column, row) = (column as usize, row as usize);
-            let stored = &mut region.words[row * REGION + column];
-            if nearest(z) <= *stored {
-                let e = three!(i => set_up.edges[i][lane]);
-                let area = e[0] + e[1] + e[2];
-                let [e0, e1, e2] = three!(i => f64::from(e[i]));
-                let [z0, z1, z2] = three!(i => f64::from(z[i]));
-                let depth = (((e0 * z0 + e1 * z1) + e2 * z2) / f64::from(area)) as f32;
-                let word = i64::from(depth.to_bits()) << 32 | i64::from(self.id(triangle));
-                *stored = (*stored).min(word);
-            }
+            self.larger(s, region, set_up, lane, z, self.id(triangle));
         }
-        let mut lanes = set_up.several;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % LANES;
-            lanes &= lanes - 1;
-            let triangle = room.kept[3][from + lane] as usize;
-            let z = self.depths(room, triangle, set_up.turned >> lane & 1 == 1);
-            self.several(s, region, set_up, lane, z, self.id(triangle));
+        set_up.tiny | set_up.larger != 0
+    }
+
+    /// One covered sample: the box's first (0), the one to its right (1), or those below (2, 3).
+    #[inline(always)]
+    fn sample(&self, region: &mut Region<'_>, room: &Room, from: usize, lane: usize, which: usize) {
+        let set_up = &room.set_up;
+        let triangle = room.kept[3][from + lane] as usize;
+        let z = self.depths(room, triangle, set_up.turned >> lane & 1 == 1);
+        let (right, down) = (which as i32 & 1, which as i32 >> 1);
+        let column = set_up.first[0][lane] + right + self.min[0] - region.origin[0];
+        let row = set_up.first[1][lane] + down + self.min[1] - region.origin[1];
+        let stored = &mut region.words[row as usize * REGION + column as usize];
+        if nearest(z) <= *stored {
+            let e = three!(i => {
+                set_up.edges[i][lane] + right * set_up.right[i][lane] + down * set_up.down[i][lane]
+            });
+            let area = f64::from(e[0] + e[1] + e[2]);
+            let [e0, e1, e2] = three!(i => f64::from(e[i]));
+            let [z0, z1, z2] = three!(i => f64::from(z[i]));
+            let depth = (((e0 * z0 + e1 * z1) + e2 * z2) / area) as f32;
+            let word = i64::from(depth.to_bits()) << 32 | i64::from(self.id(triangle));
+            *stored = (*stored).min(word);
         }
-        set_up.single | set_up.several != 0
     }
 
     /// One triangle, eight columns of a row at a time.
     #[inline(always)]
-    fn several<S: Simd>(
+    fn larger<S: Simd>(
         &self,
         s: S,
         region: &mut Region<'_>,
@@ -240,12 +250,12 @@ impl Job<'_> {
         let lane64 = f64x8::load_array(s, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
         let along32 = three!(i => lane32 * right[i] - bias[i]);
         let along64 = three!(i => lane64 * f64::from(right[i]));
-        for column in (x0..=x1).step_by(8) {
+        for column in (x0..x1 + 1).step_by(8) {
             // Eight columns within the region; those before the box are outside the triangle.
             let start = column.min(REGION - 8);
             let shift = start as i32 - x0 as i32;
             let mut e = three!(i => at[i] + right[i] * shift);
-            for row in y0..=y1 {
+            for row in y0..y1 + 1 {
                 let inside = (along32[0] + e[0]) | (along32[1] + e[1]) | (along32[2] + e[2]);
                 let covered = inside.simd_ge(0).to_bitmask();
                 if covered != 0 {
@@ -370,7 +380,9 @@ fn set_up<S: Simd>(
     let (px, py) = ((left << 8) + 128, (top << 8) + 128);
     let out = &mut room.set_up;
     let mut edges = [i32x16::splat(s, 0); 3];
-    let mut inside = i32x16::splat(s, 0);
+    // Signs of the edge values at the four samples of a tiny box, over all edges.
+    let none = i32x16::splat(s, 0);
+    let mut outside = [none; 4];
     let ends = [(x1, y1, x2, y2), (x2, y2, x0, y0), (x0, y0, x1, y1)];
     for i in 0..3 {
         let (ax, ay, bx, by) = ends[i];
@@ -378,20 +390,35 @@ fn set_up<S: Simd>(
         // The three add up to the area.
         edges[i] = if i < 2 { dx * (py - ay) - dy * (px - ax) } else { area - edges[0] - edges[1] };
         let owns = dy.simd_lt(0) | (dy.simd_eq(0) & dx.simd_gt(0));
-        let bias = owns.select(i32x16::splat(s, 0), i32x16::splat(s, 1));
-        inside = inside | (edges[i] - bias);
+        let bias = owns.select(none, i32x16::splat(s, 1));
+        let (step_right, step_down) = (-(dy << 8), dx << 8);
+        let first = edges[i] - bias;
+        let below = first + step_down;
+        outside[0] |= first;
+        outside[1] |= first + step_right;
+        outside[2] |= below;
+        outside[3] |= below + step_right;
         edges[i].store_array(&mut out.edges[i]);
         bias.store_array(&mut out.bias[i]);
-        (-(dy << 8)).store_array(&mut out.right[i]);
-        (dx << 8).store_array(&mut out.down[i]);
+        step_right.store_array(&mut out.right[i]);
+        step_down.store_array(&mut out.down[i]);
     }
     left.store_array(&mut out.first[0]);
     top.store_array(&mut out.first[1]);
     right.store_array(&mut out.last[0]);
     bottom.store_array(&mut out.last[1]);
-    let one = left.simd_eq(right) & top.simd_eq(bottom);
+    let (wide, high) = (right - left, bottom - top);
     let live = live.to_bitmask() & lanes;
+    let tiny = live & (wide | high).simd_le(1).to_bitmask();
+    let (two_wide, two_high) = (wide.simd_gt(0).to_bitmask(), high.simd_gt(0).to_bitmask());
+    let covered = inlined(
+        #[inline(always)]
+        |which: usize| outside[which].simd_ge(0).to_bitmask() & tiny,
+    );
     out.turned = turned.to_bitmask();
-    out.single = live & (one & inside.simd_ge(0)).to_bitmask();
-    out.several = live & !one.to_bitmask();
+    out.tiny = covered(0)
+        | (covered(1) & two_wide) << LANES
+        | (covered(2) & two_high) << (2 * LANES)
+        | (covered(3) & two_wide & two_high) << (3 * LANES);
+    out.larger = live & !tiny;
 }
