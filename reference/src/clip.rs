@@ -8,6 +8,10 @@ pub(crate) type ClipVertex = [f32; 4];
 /// A triangle cut by six planes has at most nine corners.
 pub(crate) const MAX_CORNERS: usize = 9;
 
+fn projects(c: &ClipVertex) -> bool {
+    c[3] > 0.0 && (1.0 / c[3]).is_finite()
+}
+
 /// A convex polygon in clip space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Polygon {
@@ -60,6 +64,18 @@ impl Clipper {
         }
     }
 
+    /// A bit for each plane that the vertex is beyond, the lowest for near, and the seventh where it is
+    /// not finite or has no reciprocal: [`Clipper::clip`] gives back a triangle whose vertices have none
+    /// as it is, and nothing for one whose vertices are all beyond near.
+    pub(crate) fn outside(&self, vertex: ClipVertex) -> u8 {
+        let finite = vertex.iter().all(|c| c.is_finite());
+        let mut bits = u8::from(!(finite && projects(&vertex))) << 6;
+        for plane in 0..6 {
+            bits |= u8::from(self.distance(plane, vertex) < 0.0) << plane;
+        }
+        bits
+    }
+
     /// The part of the triangle inside all planes; `None` where nothing is left, or where a coordinate
     /// is not finite, or where a corner's w has no finite reciprocal. The last can be only where the
     /// corner coincides with the eye within rounding (z ≥ 0, z ≤ w and |x|, |y| ≤ k·w leave nothing
@@ -76,7 +92,6 @@ impl Clipper {
                 polygon = self.cut(plane, &polygon);
             }
         }
-        let projects = |c: &ClipVertex| c[3] > 0.0 && (1.0 / c[3]).is_finite();
         (polygon.len >= 3 && polygon.corners().iter().all(projects)).then_some(polygon)
     }
 

@@ -6,28 +6,28 @@
 //! S = |m₀|·X + |m₄|·Y + |m₈|·Z + |m₁₂| for coordinates up to X, Y, Z, so it is within γ₄·S of the
 //! exact one (Higham 2002, *Accuracy and Stability of Numerical Algorithms*, §3.1), be it a vertex of
 //! the cluster or a corner of its box, which is computed alike. [`ROUNDINGS`]·u·S covers both together
-//! twice over. The exact clip coordinates of a vertex lie among those of the corners, and so does any
+//! twice over, and the roundings of S itself with them. The exact clip coordinates of a vertex lie among those of the corners, and so does any
 //! quotient of two of them while the divisor is positive (it is monotone along every segment). What
 //! the divisions, the scaling and the snapping add is in [`Projection::clusters`].
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16, mask32x16};
+use fearless_simd::{Simd, f32x16};
 
 use super::inlined;
-use super::mesh::Mesh;
+use super::level::LANES;
 use crate::image::Viewport;
 
 /// Roundings of clip coordinates, of a vertex and a corner together (4 + 4), doubled.
-const ROUNDINGS: f64 = 16.0;
+const ROUNDINGS: f32 = 16.0;
 /// The unit roundoff of f32.
-const UNIT: f64 = 1.0 / 16_777_216.0;
+const UNIT: f32 = 1.0 / 16_777_216.0;
 /// A cluster is outside where all its clip coordinates are beyond a plane by this many times the error
 /// of one: new vertices of clipped triangles err by at most γ₁₈ of the largest coordinate more (three
 /// roundings for each of six planes), and 16 · 4 is above 4 + 18 twice over.
 const OUTSIDE: f32 = 4.0;
 /// Clip coordinates below this and sums of two of them overflow nowhere; an instance with larger ones
 /// (or with a matrix that is not finite) is wide altogether.
-const LARGEST: f64 = (1_u128 << 125) as f64;
+const LARGEST: f32 = (1_u128 << 125) as f32;
 /// Largest side of a cluster that takes the narrow path. Differences of sub-pixels up to 120·256 and
 /// samples up to seven columns beyond keep an edge value within 2·(127·256)² < 2³¹.
 pub(crate) const NARROW_PIXELS: i32 = 120;
@@ -44,61 +44,66 @@ pub(crate) enum Place {
     Wide,
 }
 
-/// What all clusters of one instance share.
+/// Sixteen clusters, each with the matrix of its instance, by component.
+pub(crate) struct Batch {
+    pub(crate) matrix: [[f32; LANES]; 16],
+    /// Lowest x, y, z, highest x, y, z.
+    pub(crate) boxes: [[f32; LANES]; 6],
+}
+
+impl Batch {
+    pub(crate) fn new() -> Self {
+        Self { matrix: [[0.0; LANES]; 16], boxes: [[0.0; LANES]; 6] }
+    }
+}
+
+/// From clip space to pixels.
 pub(crate) struct Projection {
-    matrix: [f32; 16],
     half: [f32; 2],
-    /// Error of a clip coordinate, by component.
-    error: [f32; 4],
     last: [f32; 2],
 }
 
 impl Projection {
-    pub(crate) fn new(viewport: Viewport, matrix: [f32; 16], reach: [f32; 3]) -> Self {
-        let error = std::array::from_fn(|row| {
-            let m = |column: usize| f64::from(matrix[4 * column + row]).abs();
-            let [x, y, z] = reach.map(f64::from);
-            let sum = m(0) * x + m(1) * y + m(2) * z + m(3);
-            if sum < LARGEST {
-                // Rounded up, so that even a sum of denormals has a margin.
-                ((sum * ROUNDINGS * UNIT) as f32).next_up()
-            } else {
-                f32::INFINITY
-            }
-        });
-        let side = |pixels: u32| pixels as f32;
-        Self {
-            matrix,
-            half: [side(viewport.width) * 0.5, side(viewport.height) * 0.5],
-            error,
-            last: [side(viewport.width), side(viewport.height)],
-        }
+    pub(crate) fn new(viewport: Viewport) -> Self {
+        let last = [viewport.width as f32, viewport.height as f32];
+        Self { half: [last[0] * 0.5, last[1] * 0.5], last }
     }
 
-    /// Places of the sixteen clusters from `first` on, a multiple of sixteen.
+    /// Places of sixteen clusters.
     ///
     /// Every comparison is written so that a coordinate that is no number ends in [`Place::Wide`].
     #[inline(always)]
-    pub(crate) fn clusters<S: Simd>(&self, s: S, mesh: &Mesh, first: usize) -> [Place; 16] {
+    pub(crate) fn clusters<S: Simd>(&self, s: S, batch: &Batch) -> [Place; LANES] {
         let load = inlined(
             #[inline(always)]
-            |i: usize| f32x16::from_slice(s, &mesh.boxes[i][first..first + 16]),
+            |i: usize| f32x16::load_array_ref(s, &batch.boxes[i]),
         );
-        let [ex, ey, ez, ew] = self.error;
-        let mut seen = Extremes::new(s);
-        let terms = inlined(
+        let m = inlined(
             #[inline(always)]
-            |axis: usize, row: usize, high: usize| {
-                load(axis + 3 * high) * self.matrix[4 * axis + row]
+            |i: usize| f32x16::load_array_ref(s, &batch.matrix[i]),
+        );
+        let reach = three!(axis => load(axis).abs().max(load(axis + 3).abs()));
+        let error = inlined(
+            #[inline(always)]
+            |row: usize| {
+                let [x, y, z] = three!(axis => m(4 * axis + row).abs() * reach[axis]);
+                let sum = ((x + y) + z) + m(12 + row).abs();
+                // Even a sum of denormals has a margin.
+                let error = sum * (ROUNDINGS * UNIT) + f32::MIN_POSITIVE;
+                sum.simd_lt(LARGEST).select(error, f32x16::splat(s, f32::INFINITY))
             },
         );
+        let (ex, ey, ez, ew) = (error(0), error(1), error(2), error(3));
+        let mut seen = Extremes::new(s);
         // The eight corners, each coordinate in the written order.
-        for corner in 0..8 {
+        for corner in 0..8_usize {
             let clip = inlined(
                 #[inline(always)]
                 |row: usize| {
-                    let [x, y, z] = three!(axis => terms(axis, row, corner >> axis & 1));
-                    ((x + y) + z) + self.matrix[12 + row]
+                    let [x, y, z] = three!(axis => {
+                        m(4 * axis + row) * load(axis + 3 * (corner >> axis & 1))
+                    });
+                    ((x + y) + z) + m(12 + row)
                 },
             );
             seen.add([clip(0), clip(1), clip(2), clip(3)]);
@@ -107,7 +112,7 @@ impl Projection {
         // Distances to the six planes over the corners: all beyond one of them?
         let beyond = inlined(
             #[inline(always)]
-            |highest: f32x16<S>, error: f32| highest.simd_lt(-OUTSIDE * error),
+            |highest: f32x16<S>, error: f32x16<S>| highest.simd_lt(error * -OUTSIDE),
         );
         let outside = beyond(seen.high_z, ez)
             | beyond(seen.high_far, ez + ew)
@@ -120,12 +125,11 @@ impl Projection {
         let whole = least_w.simd_gt(zero) & seen.low_z.simd_ge(ez) & seen.low_far.simd_ge(ez + ew);
         // A quotient a/w of a vertex differs from the exact one by at most (Ea + |a/w|·Ew) / w, the
         // corner's likewise (both are in the errors); then come at most eight roundings of numbers up
-        // to the quotient (reciprocal, product, scaling, and the corner's division), and for columns and
-        // rows one of the offset and half a sub-pixel.
-        let unit = UNIT as f32;
+        // to the quotient (reciprocal, product, scaling, and the corner's division), and for columns
+        // and rows one of the offset and half a sub-pixel.
         let spread = inlined(
             #[inline(always)]
-            |most: f32x16<S>, error: f32| (most * ew + error) / least_w + most * (8.0 * unit),
+            |most: f32x16<S>, error: f32x16<S>| (most * ew + error) / least_w + most * (8.0 * UNIT),
         );
         let most = inlined(
             #[inline(always)]
@@ -133,9 +137,9 @@ impl Projection {
         );
         let span = inlined(
             #[inline(always)]
-            |low: f32x16<S>, high: f32x16<S>, error: f32, half: f32, flip: f32| {
+            |low: f32x16<S>, high: f32x16<S>, error: f32x16<S>, half: f32, flip: f32| {
                 let spread = spread(most(low, high), error) * (2.0 * half)
-                    + (4.0 * unit * half + 2.0 * unit * half + 1.0 / 256.0);
+                    + (6.0 * UNIT * half + 1.0 / 256.0);
                 let (a, b) = (low * (half * flip) + half, high * (half * flip) + half);
                 ((a.min(b) - spread).floor(), (a.max(b) + spread).floor())
             },
@@ -149,35 +153,34 @@ impl Projection {
         let near = (seen.low_depth - spread(most(seen.low_depth, seen.high_depth), ez) * 2.0).max(zero)
             // Turns −0 into +0.
             + 0.0;
-        self.places(outside | (narrow & aside), narrow, [x0, y0, x1, y1], near)
+        let all = u64::MAX >> (64 - LANES);
+        let narrow = narrow.to_bitmask() & all;
+        let outside = (outside.to_bitmask() | narrow & aside.to_bitmask()) & all;
+        places(outside, narrow, [x0, y0, x1, y1], near)
     }
+}
 
-    #[inline(always)]
-    fn places<S: Simd>(
-        &self,
-        outside: mask32x16<S>,
-        narrow: mask32x16<S>,
-        spans: [f32x16<S>; 4],
-        near: f32x16<S>,
-    ) -> [Place; 16] {
-        let (outside, narrow) = (outside.to_bitmask(), narrow.to_bitmask());
-        let [x0, y0, x1, y1] = spans;
-        let (x0, y0) = (x0.to_array(), y0.to_array());
-        let (x1, y1) = (x1.to_array(), y1.to_array());
-        let near = near.to_array();
-        std::array::from_fn(|i| {
-            if outside >> i & 1 == 1 {
-                Place::Outside
-            } else if narrow >> i & 1 == 1 {
-                // Between −120 and 16,504: neither outside nor wide.
-                let pixel = |x: f32, y: f32| [x as i16, y as i16];
-                let (min, max) = (pixel(x0[i], y0[i]), pixel(x1[i], y1[i]));
-                Place::Narrow { min, max, near: near[i].to_bits() }
-            } else {
-                Place::Wide
-            }
-        })
+#[inline(always)]
+fn places<S: Simd>(
+    outside: u64,
+    narrow: u64,
+    [x0, y0, x1, y1]: [f32x16<S>; 4],
+    near: f32x16<S>,
+) -> [Place; LANES] {
+    let (x0, y0) = (x0.to_array(), y0.to_array());
+    let (x1, y1) = (x1.to_array(), y1.to_array());
+    let near = near.to_array();
+    let mut places = [Place::Wide; LANES];
+    for (i, place) in places.iter_mut().enumerate() {
+        if outside >> i & 1 == 1 {
+            *place = Place::Outside;
+        } else if narrow >> i & 1 == 1 {
+            // Between −120 and 16,504: neither outside nor wide.
+            let (min, max) = ([x0[i] as i16, y0[i] as i16], [x1[i] as i16, y1[i] as i16]);
+            *place = Place::Narrow { min, max, near: near[i].to_bits() };
+        }
     }
+    places
 }
 
 /// Extremes over the corners of sixteen boxes.

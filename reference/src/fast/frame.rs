@@ -1,25 +1,27 @@
 //! One call's units: what is drawn, where it is on the screen, and in which regions.
 
+use std::ops::Range;
+
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use super::bound::{Place, Projection};
+use super::bound::{Batch, Place, Projection};
 use super::level::LANES;
-use super::mesh::UNIT_CLUSTERS;
+use super::mesh::{CLUSTER_VERTICES, Cluster, Mesh, UNIT_CLUSTERS};
 use super::wide::Wide;
 use super::{Instance, Work};
-use crate::draw::transform;
+use crate::draw::{Faces, transform};
 use crate::image::{REGION, Viewport};
-use crate::window::Window;
+use crate::window::{Oriented, Window, WindowVertex};
 
 /// Neighbouring clusters of one instance.
 pub(crate) struct Unit {
     pub(crate) instance: u32,
     pub(crate) first_cluster: u32,
-    /// One a cluster.
-    pub(crate) places: Vec<Place>,
-    /// Triangles of the clusters whose place is wide.
-    pub(crate) wide: Vec<Wide>,
+    /// Which of the lists of [`Frame::lists`] has its places and triangles, and where there.
+    list: u32,
+    places: [u32; 2],
+    wide: [u32; 2],
     /// Pixels that hold it; none where `min` is above `max`.
     pub(crate) min: [i16; 2],
     pub(crate) max: [i16; 2],
@@ -27,17 +29,27 @@ pub(crate) struct Unit {
     pub(crate) near: u32,
 }
 
+/// What the units of one task have.
+#[derive(Default)]
+struct Lists {
+    /// One a cluster.
+    places: Vec<Place>,
+    /// Triangles of the clusters whose place is wide.
+    wide: Vec<Wide>,
+}
+
 /// Everything that regions read.
 pub(crate) struct Frame<'a> {
     pub(crate) instances: &'a [Instance<'a>],
     pub(crate) units: Vec<Unit>,
+    lists: Vec<Lists>,
     pub(crate) half: [f32; 2],
     /// Whether clusters that are strictly behind are left out.
     pub(crate) skips: bool,
 }
 
 /// Units that one task projects.
-const UNITS_PER_TASK: usize = 64;
+const UNITS_PER_TASK: usize = 256;
 
 impl<'a> Frame<'a> {
     /// Projects all clusters and sets up the triangles of the wide ones.
@@ -47,25 +59,46 @@ impl<'a> Frame<'a> {
         instances: &'a [Instance<'a>],
         skips: bool,
     ) -> (Self, Work) {
-        let names: Vec<(u32, u32)> = instances
-            .iter()
-            .enumerate()
-            .flat_map(|(i, instance)| {
-                let clusters = instance.mesh.clusters.len() as u32;
-                (0..clusters).step_by(UNIT_CLUSTERS).map(move |first| (i as u32, first))
-            })
-            .collect();
-        let project = |&(instance, first): &(u32, u32)| {
-            let of = &instances[instance as usize];
-            dispatch!(level, s => Unit::new(s, viewport, of, instance, first))
+        let mut names = Vec::new();
+        for (i, instance) in instances.iter().enumerate() {
+            let clusters = instance.mesh.clusters.len() as u32;
+            names.extend((0..clusters).step_by(UNIT_CLUSTERS).map(|first| (i as u32, first)));
+        }
+        let project = |names: &[(u32, u32)]| {
+            let mut task = Task::new(viewport, instances);
+            dispatch!(level, s => task.project(s, names));
+            task
         };
-        let units: Vec<Unit> = names.par_iter().with_min_len(UNITS_PER_TASK).map(project).collect();
-        let work = units.iter().fold(Work::default(), |work, unit| work + unit.work(instances));
+        let tasks: Vec<Task<'_>> = names.par_chunks(UNITS_PER_TASK).map(project).collect();
         let half = [viewport.width as f32 * 0.5, viewport.height as f32 * 0.5];
-        (Self { instances, units, half, skips }, work)
+        let mut frame = Self {
+            instances,
+            units: Vec::with_capacity(names.len()),
+            lists: Vec::with_capacity(tasks.len()),
+            half,
+            skips,
+        };
+        let mut work = Work::default();
+        for task in tasks {
+            work = work + task.work;
+            let list = frame.lists.len() as u32;
+            frame.units.extend(task.units.into_iter().map(|unit| Unit { list, ..unit }));
+            frame.lists.push(task.lists);
+        }
+        (frame, work)
     }
 
-    /// For each region the keys of its units, sorted: bits of the nearest depth, then the unit.
+    /// One a cluster of the unit.
+    pub(crate) fn places(&self, unit: &Unit) -> &[Place] {
+        &self.lists[unit.list as usize].places[range(unit.places)]
+    }
+
+    /// Triangles of the unit's wide clusters.
+    pub(crate) fn wide(&self, unit: &Unit) -> &[Wide] {
+        &self.lists[unit.list as usize].wide[range(unit.wide)]
+    }
+
+    /// For each region the keys of its units, not sorted: bits of the nearest depth, then the unit.
     pub(crate) fn regions(&self, viewport: Viewport) -> Vec<Vec<u64>> {
         let across = (viewport.width as usize).div_ceil(REGION);
         let down = (viewport.height as usize).div_ceil(REGION);
@@ -86,99 +119,197 @@ impl<'a> Frame<'a> {
     }
 }
 
-impl Unit {
+fn range([from, to]: [u32; 2]) -> Range<usize> {
+    from as usize..to as usize
+}
+
+/// Some units on one thread.
+struct Task<'a> {
+    instances: &'a [Instance<'a>],
+    viewport: Viewport,
+    window: Window,
+    projection: Projection,
+    batch: Batch,
+    units: Vec<Unit>,
+    lists: Lists,
+    work: Work,
+}
+
+impl<'a> Task<'a> {
+    fn new(viewport: Viewport, instances: &'a [Instance<'a>]) -> Self {
+        Self {
+            instances,
+            viewport,
+            window: Window::new(viewport),
+            projection: Projection::new(viewport),
+            batch: Batch::new(),
+            units: Vec::new(),
+            lists: Lists::default(),
+            work: Work::default(),
+        }
+    }
+
+    /// Units (instance, first cluster) one after the other; as many that have one cluster as fit go
+    /// through the projection together.
     #[inline(always)]
-    fn new<S: Simd>(
-        s: S,
-        viewport: Viewport,
-        instance: &Instance<'_>,
-        number: u32,
-        first: u32,
-    ) -> Self {
-        let mesh = instance.mesh;
-        let projection = Projection::new(viewport, instance.clip_from_object, mesh.reach);
-        let last = mesh.clusters.len().min(first as usize + UNIT_CLUSTERS);
-        let mut unit = Self {
-            instance: number,
+    fn project<S: Simd>(&mut self, s: S, names: &[(u32, u32)]) {
+        let mut rest = names;
+        while let [(instance, first), ..] = *rest {
+            let mesh = self.instances[instance as usize].mesh;
+            let clusters = (mesh.clusters.len() - first as usize).min(UNIT_CLUSTERS);
+            let mut taken = 1;
+            let from = self.lists.places.len() as u32;
+            if clusters == 1 {
+                let single =
+                    |name: &&(u32, u32)| self.instances[name.0 as usize].mesh.clusters.len() == 1;
+                // One cluster may also be what is left of a larger mesh.
+                taken = rest.iter().take(LANES).take_while(single).count().max(1);
+                for (lane, &(instance, first)) in rest[..taken].iter().enumerate() {
+                    self.load(instance, first as usize, lane..lane + 1);
+                }
+                let places = self.projection.clusters(s, &self.batch);
+                self.lists.places.extend_from_slice(&places[..taken]);
+            } else {
+                for at in (0..clusters).step_by(LANES) {
+                    let count = (clusters - at).min(LANES);
+                    self.load(instance, first as usize + at, 0..count);
+                    let places = self.projection.clusters(s, &self.batch);
+                    self.lists.places.extend_from_slice(&places[..count]);
+                }
+            }
+            for (i, &(instance, first)) in rest[..taken].iter().enumerate() {
+                let from = from + i as u32;
+                self.unit(instance, first, [from, from + clusters as u32]);
+            }
+            rest = &rest[taken..];
+        }
+    }
+
+    /// Puts clusters of one instance, from `first` on, into lanes.
+    #[inline(always)]
+    fn load(&mut self, instance: u32, first: usize, lanes: Range<usize>) {
+        let instance = &self.instances[instance as usize];
+        for (row, &element) in self.batch.matrix.iter_mut().zip(&instance.clip_from_object) {
+            row[lanes.clone()].fill(element);
+        }
+        for (row, bounds) in self.batch.boxes.iter_mut().zip(&instance.mesh.boxes) {
+            row[lanes.clone()].copy_from_slice(&bounds[first..first + lanes.len()]);
+        }
+    }
+
+    fn unit(&mut self, instance: u32, first: u32, places: [u32; 2]) {
+        let wide = self.lists.wide.len() as u32;
+        let mut unit = Unit {
+            instance,
             first_cluster: first,
-            places: Vec::with_capacity(last - first as usize),
-            wide: Vec::new(),
+            list: 0,
+            places,
+            wide: [wide, wide],
             min: [i16::MAX; 2],
             max: [i16::MIN; 2],
             near: u32::MAX,
         };
-        for from in (first as usize..last).step_by(LANES) {
-            let places = projection.clusters(s, mesh, from);
-            unit.places.extend_from_slice(&places[..(last - from).min(LANES)]);
-        }
-        let window = Window::new(viewport);
-        for i in 0..unit.places.len() {
-            match unit.places[i] {
-                Place::Outside => {}
-                Place::Narrow { min, max, near } => unit.hold(min, max, near),
-                Place::Wide => unit.set_up(viewport, &window, instance, first as usize + i),
+        self.work.units += 1;
+        for (i, place) in range(places).enumerate() {
+            match self.lists.places[place] {
+                Place::Outside => self.work.clusters_outside += 1,
+                Place::Narrow { min, max, near } => {
+                    self.work.clusters_narrow += 1;
+                    unit.hold(min, max, near);
+                }
+                Place::Wide => {
+                    let instance = &self.instances[instance as usize];
+                    let cluster = instance.mesh.clusters[first as usize + i];
+                    self.work.clusters_wide += 1;
+                    self.work.triangles += u64::from(cluster.triangles);
+                    self.set_up(instance, cluster);
+                }
             }
         }
-        unit
+        unit.wide[1] = self.lists.wide.len() as u32;
+        for wide in &self.lists.wide[range(unit.wide)] {
+            unit.hold(wide.min, wide.max, wide.near());
+        }
+        self.units.push(unit);
     }
 
+    /// Transforms, clips and snaps the triangles of a cluster one by one, as `naive` does; a vertex of
+    /// triangles that no plane cuts is snapped once, which gives the same bits.
+    #[inline(never)]
+    fn set_up(&mut self, instance: &Instance<'_>, cluster: Cluster) {
+        let mesh = instance.mesh;
+        let corners = Corners::new(&self.window, instance, cluster);
+        let first = cluster.first_triangle as usize;
+        for i in first..first + usize::from(cluster.triangles) {
+            let at = triangle(mesh, i);
+            let [a, b, c] = at.map(|corner| corners.outside[corner]);
+            // Wholly before the near plane: nothing would be left.
+            if a & b & c & 1 != 0 {
+                continue;
+            }
+            let id = instance.first_draw + mesh.ranks[i] + 1;
+            if a | b | c == 0 {
+                let whole = Oriented::new(at.map(|corner| corners.snapped[corner]), instance.faces);
+                self.push(whole, id);
+            } else {
+                let clip = at.map(|corner| corners.clip[corner]);
+                self.push_clipped(clip, instance.faces, id);
+            }
+        }
+    }
+
+    fn push(&mut self, triangle: Option<Oriented>, id: u32) {
+        self.lists.wide.extend(triangle.and_then(|t| Wide::new(t, id, self.viewport)));
+    }
+
+    fn push_clipped(&mut self, clip: [[f32; 4]; 3], faces: Faces, id: u32) {
+        if let Some(polygon) = self.window.clipper.clip(clip) {
+            let fan = self.window.fan(&polygon, faces);
+            self.lists.wide.extend(fan.filter_map(|t| Wide::new(t, id, self.viewport)));
+        }
+    }
+}
+
+impl Unit {
     fn hold(&mut self, min: [i16; 2], max: [i16; 2], near: u32) {
         self.min = [self.min[0].min(min[0]), self.min[1].min(min[1])];
         self.max = [self.max[0].max(max[0]), self.max[1].max(max[1])];
         self.near = self.near.min(near);
     }
+}
 
-    /// Transforms, clips and snaps the triangles of a cluster one by one, as `naive` does.
-    #[cold]
-    fn set_up(
-        &mut self,
-        viewport: Viewport,
-        window: &Window,
-        instance: &Instance<'_>,
-        cluster: usize,
-    ) {
-        let mesh = instance.mesh;
-        let cluster = mesh.clusters[cluster];
+fn triangle(mesh: &Mesh, i: usize) -> [usize; 3] {
+    [0, 1, 2].map(|corner| usize::from(mesh.corners[corner][i]) % CLUSTER_VERTICES)
+}
+
+/// Vertices of one cluster.
+struct Corners {
+    clip: [[f32; 4]; CLUSTER_VERTICES],
+    /// A bit for each plane that the vertex is beyond, the lowest for near, and one more where it does
+    /// not project.
+    outside: [u8; CLUSTER_VERTICES],
+    /// Only where nothing is outside.
+    snapped: [WindowVertex; CLUSTER_VERTICES],
+}
+
+impl Corners {
+    fn new(window: &Window, instance: &Instance<'_>, cluster: Cluster) -> Self {
+        let none = WindowVertex { x: 0, y: 0, z: 0.0 };
+        let mut corners = Self {
+            clip: [[0.0; 4]; CLUSTER_VERTICES],
+            outside: [0; CLUSTER_VERTICES],
+            snapped: [none; CLUSTER_VERTICES],
+        };
         let first = cluster.first_vertex as usize;
-        let mut clip = [[0.0; 4]; super::mesh::CLUSTER_VERTICES];
-        for (i, corner) in clip[..usize::from(cluster.vertices)].iter_mut().enumerate() {
-            let position = [0, 1, 2].map(|axis| mesh.positions[axis][first + i]);
-            *corner = transform(&instance.clip_from_object, position);
-        }
-        let first = cluster.first_triangle as usize;
-        for i in first..first + usize::from(cluster.triangles) {
-            let corners = [0, 1, 2].map(|corner| clip[usize::from(mesh.corners[corner][i])]);
-            // Wholly before the near plane: nothing would be left. NaN fails every comparison.
-            if corners.iter().all(|c| c[2] < 0.0) {
-                continue;
-            }
-            let Some(polygon) = window.clipper.clip(corners) else { continue };
-            let id = instance.first_draw + mesh.ranks[i] + 1;
-            for triangle in window.fan(&polygon, instance.faces) {
-                if let Some(wide) = Wide::new(triangle, id, viewport) {
-                    self.hold(wide.min, wide.max, wide.near());
-                    self.wide.push(wide);
-                }
+        for i in 0..usize::from(cluster.vertices) {
+            let position = [0, 1, 2].map(|axis| instance.mesh.positions[axis][first + i]);
+            let clip = transform(&instance.clip_from_object, position);
+            corners.clip[i] = clip;
+            corners.outside[i] = window.clipper.outside(clip);
+            if corners.outside[i] == 0 {
+                corners.snapped[i] = window.vertex(clip);
             }
         }
-    }
-
-    /// What projecting it took.
-    fn work(&self, instances: &[Instance<'_>]) -> Work {
-        let mesh = instances[self.instance as usize].mesh;
-        let mut work = Work { units: 1, ..Work::default() };
-        for (place, cluster) in
-            self.places.iter().zip(&mesh.clusters[self.first_cluster as usize..])
-        {
-            match place {
-                Place::Outside => work.clusters_outside += 1,
-                Place::Narrow { .. } => work.clusters_narrow += 1,
-                Place::Wide => {
-                    work.clusters_wide += 1;
-                    work.triangles += u64::from(cluster.triangles);
-                }
-            }
-        }
-        work
+        corners
     }
 }

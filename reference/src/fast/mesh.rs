@@ -18,8 +18,7 @@ pub(crate) const UNIT_CLUSTERS: usize = 64;
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     pub(crate) clusters: Vec<Cluster>,
-    /// Boxes of the clusters: lowest x, y, z, highest x, y, z; each as long as `clusters` rounded up to
-    /// [`LANES`], the last repeated.
+    /// Boxes of the clusters: lowest x, y, z, highest x, y, z.
     pub(crate) boxes: [Vec<f32>; 6],
     /// Positions by component; each cluster's are padded to [`LANES`] with its first vertex.
     pub(crate) positions: [Vec<f32>; 3],
@@ -28,8 +27,6 @@ pub struct Mesh {
     pub(crate) corners: [Vec<u8>; 3],
     /// Draw index of each triangle from the instance's first; padded like `corners`.
     pub(crate) ranks: Vec<u32>,
-    /// Largest absolute coordinate on each axis.
-    pub(crate) reach: [f32; 3],
     triangles: usize,
     highest_rank: u32,
 }
@@ -78,10 +75,6 @@ impl Mesh {
         let mut local = vec![u32::MAX; positions.len()];
         let source = Source { positions, triangles, ranks, centers: &centers };
         mesh.split(&source, &mut order, &mut local);
-        for bounds in &mut mesh.boxes {
-            let last = bounds.last().copied().unwrap_or(0.0);
-            bounds.resize(bounds.len().next_multiple_of(LANES), last);
-        }
         mesh
     }
 
@@ -175,7 +168,6 @@ impl Mesh {
                 .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
             self.boxes[axis].push(low);
             self.boxes[3 + axis].push(high);
-            self.reach[axis] = self.reach[axis].max(low.abs()).max(high.abs());
             let padding = used.len().next_multiple_of(LANES) - used.len();
             let first = position(used[0])[axis];
             self.positions[axis].extend(of.chain(std::iter::repeat_n(first, padding)));

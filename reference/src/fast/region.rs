@@ -37,14 +37,16 @@ pub(crate) fn draw<S: Simd>(
             let near = (item >> 32) as u32;
             let number = item as u32;
             if number & WIDE != 0 {
-                let triangle = &unit.wide[(number & !WIDE) as usize];
+                let triangle = &frame.wide(unit)[(number & !WIDE) as usize];
                 if near <= deepest {
                     wide::draw(s, triangle, region);
                     deepest = region.deepest(s);
                 }
                 continue;
             }
-            let Place::Narrow { min, max, near } = unit.places[number as usize] else { continue };
+            let Place::Narrow { min, max, near } = frame.places(unit)[number as usize] else {
+                continue;
+            };
             if frame.skips && (near > deepest || region.hidden(s, min, max, near)) {
                 work.clusters_hidden += 1;
                 continue;
@@ -65,21 +67,20 @@ pub(crate) fn draw<S: Simd>(
 
 /// Clusters and triangles of the unit that may show in the region, by nearest depth.
 fn list(frame: &Frame<'_>, unit: &Unit, region: &Region<'_>, items: &mut Vec<u64>) {
-    let _ = frame;
     let meets = |min: [i16; 2], max: [i16; 2]| {
         (0..2).all(|axis| {
             i32::from(max[axis]) >= region.origin[axis]
                 && i32::from(min[axis]) < region.origin[axis] + region.size[axis]
         })
     };
-    for (i, place) in unit.places.iter().enumerate() {
+    for (i, place) in frame.places(unit).iter().enumerate() {
         if let Place::Narrow { min, max, near } = *place
             && meets(min, max)
         {
             items.push(u64::from(near) << 32 | i as u64);
         }
     }
-    for (i, wide) in unit.wide.iter().enumerate() {
+    for (i, wide) in frame.wide(unit).iter().enumerate() {
         if meets(wide.min, wide.max) {
             items.push(u64::from(wide.near()) << 32 | u64::from(WIDE) | i as u64);
         }
