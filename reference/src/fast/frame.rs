@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::bound::{Batch, Place, Projection};
 use super::level::LANES;
-use super::mesh::{CLUSTER_VERTICES, Cluster, Mesh, UNIT_CLUSTERS};
+use super::mesh::{CLUSTER_VERTICES, Cluster, UNIT_CLUSTERS};
 use super::wide::Wide;
 use super::{Instance, Work};
 use crate::draw::{Faces, transform};
@@ -237,17 +237,16 @@ impl<'a> Task<'a> {
     /// triangles that no plane cuts is snapped once, which gives the same bits.
     #[inline(never)]
     fn set_up(&mut self, instance: &Instance<'_>, cluster: Cluster) {
-        let mesh = instance.mesh;
+        let view = instance.mesh.view(cluster);
         let corners = Corners::new(&self.window, instance, cluster);
-        let first = cluster.first_triangle as usize;
-        for i in first..first + usize::from(cluster.triangles) {
-            let at = triangle(mesh, i);
+        for i in 0..usize::from(cluster.triangles) {
+            let at = view.triangle(i);
             let [a, b, c] = at.map(|corner| corners.outside[corner]);
             // Wholly before the near plane: nothing would be left.
             if a & b & c & 1 != 0 {
                 continue;
             }
-            let id = instance.first_draw + mesh.ranks[i] + 1;
+            let id = instance.first_draw + view.ranks[i] + 1;
             if a | b | c == 0 {
                 let whole = Oriented::new(at.map(|corner| corners.snapped[corner]), instance.faces);
                 self.push(whole, id);
@@ -278,10 +277,6 @@ impl Unit {
     }
 }
 
-fn triangle(mesh: &Mesh, i: usize) -> [usize; 3] {
-    [0, 1, 2].map(|corner| usize::from(mesh.corners[corner][i]) % CLUSTER_VERTICES)
-}
-
 /// Vertices of one cluster.
 struct Corners {
     clip: [[f32; 4]; CLUSTER_VERTICES],
@@ -300,10 +295,9 @@ impl Corners {
             outside: [0; CLUSTER_VERTICES],
             snapped: [none; CLUSTER_VERTICES],
         };
-        let first = cluster.first_vertex as usize;
+        let view = instance.mesh.view(cluster);
         for i in 0..usize::from(cluster.vertices) {
-            let position = [0, 1, 2].map(|axis| instance.mesh.positions[axis][first + i]);
-            let clip = transform(&instance.clip_from_object, position);
+            let clip = transform(&instance.clip_from_object, view.position(i));
             corners.clip[i] = clip;
             corners.outside[i] = window.clipper.outside(clip);
             if corners.outside[i] == 0 {

@@ -20,13 +20,8 @@ pub struct Mesh {
     pub(crate) clusters: Vec<Cluster>,
     /// Boxes of the clusters: lowest x, y, z, highest x, y, z.
     pub(crate) boxes: [Vec<f32>; 6],
-    /// Positions by component; each cluster's are padded to [`LANES`] with its first vertex.
-    pub(crate) positions: [Vec<f32>; 3],
-    /// Corners of the triangles by corner, as places within the cluster; each cluster's are padded to
-    /// [`LANES`] with zeros, that is with triangles without area.
-    pub(crate) corners: [Vec<u8>; 3],
-    /// Draw index of each triangle from the instance's first; padded like `corners`.
-    pub(crate) ranks: Vec<u32>,
+    /// One run of words a cluster (see [`View`]), so that a cluster is one sequential read.
+    words: Vec<u32>,
     triangles: usize,
     highest_rank: u32,
 }
@@ -34,12 +29,34 @@ pub struct Mesh {
 /// A few neighbouring triangles.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cluster {
-    /// First place in `positions`, a multiple of [`LANES`].
-    pub(crate) first_vertex: u32,
-    /// First place in `corners` and `ranks`, a multiple of [`LANES`].
-    pub(crate) first_triangle: u32,
+    first_word: u32,
     pub(crate) vertices: u8,
     pub(crate) triangles: u8,
+}
+
+/// What a cluster consists of.
+#[derive(Clone, Copy)]
+pub(crate) struct View<'a> {
+    /// Bits of the positions by component; padded to [`LANES`] with the first vertex.
+    pub(crate) positions: [&'a [u32]; 3],
+    /// The triangles' corners as places among the positions, a byte each, the first lowest; padded to
+    /// [`LANES`] with zeros, that is with triangles without area.
+    pub(crate) corners: &'a [u32],
+    /// Draw index of each triangle from the instance's first; padded like `corners`.
+    pub(crate) ranks: &'a [u32],
+}
+
+impl View<'_> {
+    /// Places of the corners of a triangle.
+    #[inline(always)]
+    pub(crate) fn triangle(&self, i: usize) -> [usize; 3] {
+        let word = self.corners[i] as usize;
+        three!(corner => word >> (8 * corner) & (CLUSTER_VERTICES - 1))
+    }
+
+    pub(crate) fn position(&self, i: usize) -> [f32; 3] {
+        self.positions.map(|component| f32::from_bits(component[i]))
+    }
 }
 
 impl Mesh {
@@ -87,9 +104,19 @@ impl Mesh {
     /// Bytes that it holds.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let floats = self.boxes.iter().chain(&self.positions).map(Vec::len).sum::<usize>();
-        let corners = self.corners.iter().map(Vec::len).sum::<usize>();
-        (floats + self.ranks.len()) * 4 + corners + self.clusters.len() * size_of::<Cluster>()
+        let floats: usize = self.boxes.iter().map(Vec::len).sum();
+        (floats + self.words.len()) * 4 + self.clusters.len() * size_of::<Cluster>()
+    }
+
+    #[inline(always)]
+    pub(crate) fn view(&self, cluster: Cluster) -> View<'_> {
+        let vertices = usize::from(cluster.vertices).next_multiple_of(LANES);
+        let triangles = usize::from(cluster.triangles).next_multiple_of(LANES);
+        let words = &self.words[cluster.first_word as usize..][..3 * vertices + 2 * triangles];
+        let (positions, words) = words.split_at(3 * vertices);
+        let (corners, ranks) = words.split_at(triangles);
+        let positions = three!(axis => &positions[axis * vertices..(axis + 1) * vertices]);
+        View { positions, corners, ranks }
     }
 
     /// The highest of the ranks, 0 for an empty mesh.
@@ -158,31 +185,30 @@ impl Mesh {
     }
 
     fn push_cluster(&mut self, source: &Source<'_>, order: &[u32], local: &[u32], used: &[u32]) {
-        let first_vertex = self.positions[0].len() as u32;
-        let first_triangle = self.ranks.len() as u32;
-        let position = |vertex: u32| source.positions[vertex as usize];
+        let first_word = u32::try_from(self.words.len()).expect("a mesh fits 16 GiB");
+        let pad = |count: usize| count.next_multiple_of(LANES) - count;
+        let position = |vertex: u32, axis: usize| source.positions[vertex as usize][axis];
         for axis in 0..3 {
-            let of = used.iter().map(|&vertex| position(vertex)[axis]);
-            let (low, high) = of
-                .clone()
-                .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
+            let of = used.iter().map(|&vertex| position(vertex, axis));
+            let (low, high) =
+                of.clone().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), c| {
+                    (low.min(c), high.max(c))
+                });
             self.boxes[axis].push(low);
             self.boxes[3 + axis].push(high);
-            let padding = used.len().next_multiple_of(LANES) - used.len();
-            let first = position(used[0])[axis];
-            self.positions[axis].extend(of.chain(std::iter::repeat_n(first, padding)));
+            let padding = std::iter::repeat_n(position(used[0], axis), pad(used.len()));
+            self.words.extend(of.chain(padding).map(f32::to_bits));
         }
-        let padding = order.len().next_multiple_of(LANES) - order.len();
-        for (corner, places) in self.corners.iter_mut().enumerate() {
-            let of =
-                order.iter().map(|&t| local[source.triangles[t as usize][corner] as usize] as u8);
-            places.extend(of.chain(std::iter::repeat_n(0, padding)));
-        }
+        let corners = order.iter().map(|&t| {
+            let [a, b, c] = source.triangles[t as usize].map(|vertex| local[vertex as usize]);
+            a | b << 8 | c << 16
+        });
         let ranks = order.iter().map(|&t| source.ranks[t as usize]);
-        self.ranks.extend(ranks.chain(std::iter::repeat_n(0, padding)));
+        let padding = || std::iter::repeat_n(0, pad(order.len()));
+        self.words.extend(corners.chain(padding()));
+        self.words.extend(ranks.chain(padding()));
         self.clusters.push(Cluster {
-            first_vertex,
-            first_triangle,
+            first_word,
             vertices: used.len() as u8,
             triangles: order.len() as u8,
         });

@@ -8,7 +8,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, f64x8, i16x32, i32x8, i32x16, i64x8, mask64x8, u32x16};
 
 use super::level::LANES;
-use super::mesh::{CLUSTER_VERTICES, Cluster, Mesh};
+use super::mesh::{CLUSTER_VERTICES, View};
 use super::{Instance, inlined, lookup};
 use crate::draw::Faces;
 use crate::image::{BLOCK, BLOCKS, REGION, Region};
@@ -73,9 +73,10 @@ impl Room {
 
 /// One cluster to draw into one region.
 pub(crate) struct Job<'a> {
-    pub(crate) mesh: &'a Mesh,
     pub(crate) instance: &'a Instance<'a>,
-    pub(crate) cluster: Cluster,
+    pub(crate) view: View<'a>,
+    pub(crate) vertices: usize,
+    pub(crate) triangles: usize,
     /// Half the image's columns and rows.
     pub(crate) half: [f32; 2],
     /// First of the pixels that hold the cluster.
@@ -86,12 +87,8 @@ pub(crate) struct Job<'a> {
 #[inline(always)]
 pub(crate) fn draw<S: Simd>(s: S, job: &Job<'_>, region: &mut Region<'_>, room: &mut Room) {
     job.transform(s, room);
-    let first = job.cluster.first_triangle as usize;
-    let count = usize::from(job.cluster.triangles);
-    for (corner, places) in room.corners.iter_mut().zip(&job.mesh.corners) {
-        let padded = count.next_multiple_of(LANES);
-        lookup::corners(s, &room.snapped, &places[first..first + padded], &mut corner[..padded]);
-    }
+    let count = job.triangles;
+    lookup::corners(s, &room.snapped, job.view.corners, &mut room.corners);
     // The region's pixels from the cluster's first one.
     let low = [0, 1].map(|axis| (region.origin[axis] - job.min[axis]).max(0));
     let high = [0, 1].map(|axis| {
@@ -121,15 +118,12 @@ impl Job<'_> {
     #[inline(always)]
     fn transform<S: Simd>(&self, s: S, room: &mut Room) {
         let m = &self.instance.clip_from_object;
-        let first = self.cluster.first_vertex as usize;
         let zero = f32x16::splat(s, 0.0);
         let [half_x, half_y] = self.half;
-        for at in (0..usize::from(self.cluster.vertices)).step_by(LANES) {
-            let from = first + at;
-            let [x, y, z] = three!(axis => f32x16::from_slice(
-                s,
-                &self.mesh.positions[axis][from..from + LANES],
-            ));
+        for at in (0..self.vertices).step_by(LANES) {
+            let [x, y, z]: [f32x16<S>; 3] = three!(axis => {
+                u32x16::from_slice(s, &self.view.positions[axis][at..at + LANES]).bitcast()
+            });
             let clip = inlined(
                 #[inline(always)]
                 |row: usize| ((x * m[row] + y * m[4 + row]) + z * m[8 + row]) + m[12 + row],
@@ -154,22 +148,15 @@ impl Job<'_> {
     #[inline(always)]
     fn id(&self, triangle: usize) -> u32 {
         // Instance::new has seen that the sum fits.
-        self.instance.first_draw
-            + self.mesh.ranks[self.cluster.first_triangle as usize + triangle]
-            + 1
+        self.instance.first_draw + self.view.ranks[triangle] + 1
     }
 
     /// Depths of a triangle's corners, turned as its edges are.
     #[inline(always)]
     fn depths(&self, room: &Room, triangle: usize, turned: bool) -> [f32; 3] {
-        let place = self.cluster.first_triangle as usize + triangle;
-        let depth = inlined(
-            #[inline(always)]
-            |corner: usize| {
-                room.depth[usize::from(self.mesh.corners[corner][place]) % CLUSTER_VERTICES]
-            },
-        );
-        if turned { [depth(0), depth(2), depth(1)] } else { [depth(0), depth(1), depth(2)] }
+        let [a, b, c] = self.view.triangle(triangle);
+        let [a, b, c] = if turned { [a, c, b] } else { [a, b, c] };
+        [room.depth[a], room.depth[b], room.depth[c]]
     }
 
     /// Draws the triangles that [`set_up`] has prepared. Whether any sample was reached.
@@ -257,19 +244,18 @@ impl Job<'_> {
             let mut e = three!(i => at[i] + right[i] * shift);
             for row in y0..y1 + 1 {
                 let inside = (along32[0] + e[0]) | (along32[1] + e[1]) | (along32[2] + e[2]);
+                let place = row * REGION + start;
+                let words = &mut region.words[place..place + 8];
+                let stored = i64x8::from_slice(s, words);
+                // One branch a row: whether a row is covered and whether it is hidden are both hard to
+                // predict.
                 let covered = inside.simd_ge(0).to_bitmask();
-                if covered != 0 {
-                    let place = row * REGION + start;
-                    let words = &mut region.words[place..place + 8];
-                    let stored = i64x8::from_slice(s, words);
-                    let reached = covered & nearest.simd_le(stored).to_bitmask();
-                    if reached != 0 {
-                        let e = three!(i => along64[i] + f64::from(e[i]));
-                        let word = depth_words(s, e, z, area, id);
-                        let lower =
-                            mask64x8::from_bitmask(s, reached).select(word.min(stored), stored);
-                        lower.store_slice(words);
-                    }
+                let reached = covered & nearest.simd_le(stored).to_bitmask();
+                if reached != 0 {
+                    let e = three!(i => along64[i] + f64::from(e[i]));
+                    let word = depth_words(s, e, z, area, id);
+                    let lower = mask64x8::from_bitmask(s, reached).select(word.min(stored), stored);
+                    lower.store_slice(words);
                 }
                 e = [e[0] + down[0], e[1] + down[1], e[2] + down[2]];
             }

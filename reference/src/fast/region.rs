@@ -56,7 +56,14 @@ pub(crate) fn draw<S: Simd>(
             work.clusters += 1;
             work.triangles += u64::from(cluster.triangles);
             let min = min.map(i32::from);
-            let job = Job { mesh: instance.mesh, instance, cluster, half: frame.half, min };
+            let job = Job {
+                instance,
+                view: instance.mesh.view(cluster),
+                vertices: usize::from(cluster.vertices),
+                triangles: usize::from(cluster.triangles),
+                half: frame.half,
+                min,
+            };
             narrow::draw(s, &job, region, room);
         }
         deepest = region.deepest(s);
