@@ -43,6 +43,15 @@ struct Args {
     /// Also how time grows with threads, work, pixels and vectors.
     #[arg(long)]
     scaling: bool,
+    /// Only draws so many frames of the works, for a profiler; nothing is timed or compared.
+    #[arg(long, value_name = "FRAMES")]
+    profile: Option<usize>,
+    /// With --profile: leaves hidden clusters out.
+    #[arg(long)]
+    skip: bool,
+    /// With --profile: threads.
+    #[arg(long, default_value_t = 1)]
+    threads: usize,
     /// One JSON object a line on standard output.
     #[arg(long)]
     json: bool,
@@ -110,6 +119,20 @@ fn run(args: &Args) -> Result<(), String> {
     let level = args.simd.unwrap_or_else(SimdLevel::best);
     if !SimdLevel::available().contains(&level) {
         return Err(format!("this machine has no {level}"));
+    }
+    if let Some(frames) = args.profile {
+        for name in names {
+            let work = Work::named(name).expect("a known name");
+            let (instances, mut image) = (work.instances(), Image::new(work.viewport));
+            let options = Options { level, skip_hidden: args.skip };
+            let start = Instant::now();
+            let draw = || fast::render(&mut image, &instances, options);
+            let done =
+                pool(args.threads).install(|| std::iter::repeat_with(draw).nth(frames.max(1) - 1));
+            let time = start.elapsed().as_secs_f64() * 1e3 / frames.max(1) as f64;
+            println!("{name}: {time:.3} ms, {:?}", done.unwrap_or_default());
+        }
+        return Ok(());
     }
     if !args.json {
         println!(

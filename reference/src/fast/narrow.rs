@@ -342,13 +342,20 @@ fn set_up<S: Simd>(
     let [y0, y1, y2] = three!(i => row(load(i)));
     let signed = (x1 - x0) * (y2 - y0) - (y1 - y0) * (x2 - x0);
     let turned = signed.simd_lt(0);
-    let area = signed.abs();
-    let (x1, x2) = (turned.select(x2, x1), turned.select(x1, x2));
-    let (y1, y2) = (turned.select(y2, y1), turned.select(y1, y2));
     let live = match faces {
         Faces::Both => !signed.simd_eq(0),
         Faces::CounterClockwise => turned,
     };
+    let live = live.to_bitmask() & lanes;
+    let out = &mut room.set_up;
+    (out.tiny, out.larger) = (0, 0);
+    // Clusters mostly show one face.
+    if live == 0 {
+        return;
+    }
+    let area = signed.abs();
+    let (x1, x2) = (turned.select(x2, x1), turned.select(x1, x2));
+    let (y1, y2) = (turned.select(y2, y1), turned.select(y1, y2));
     let first = inlined(
         #[inline(always)]
         |a: i32x16<S>, b: i32x16<S>, c: i32x16<S>, low: i32| {
@@ -364,7 +371,6 @@ fn set_up<S: Simd>(
     let (left, top) = (first(x0, x1, x2, low[0]), first(y0, y1, y2, low[1]));
     let (right, bottom) = (last(x0, x1, x2, high[0]), last(y0, y1, y2, high[1]));
     let (px, py) = ((left << 8) + 128, (top << 8) + 128);
-    let out = &mut room.set_up;
     let mut edges = [i32x16::splat(s, 0); 3];
     // Signs of the edge values at the four samples of a tiny box, over all edges.
     let none = i32x16::splat(s, 0);
@@ -394,7 +400,6 @@ fn set_up<S: Simd>(
     right.store_array(&mut out.last[0]);
     bottom.store_array(&mut out.last[1]);
     let (wide, high) = (right - left, bottom - top);
-    let live = live.to_bitmask() & lanes;
     let tiny = live & (wide | high).simd_le(1).to_bitmask();
     let (two_wide, two_high) = (wide.simd_gt(0).to_bitmask(), high.simd_gt(0).to_bitmask());
     let covered = inlined(
