@@ -9,7 +9,7 @@
 mod lavapipe;
 mod works;
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::Parser;
 use plainsight_reference::fast::{Options, SimdLevel};
@@ -25,7 +25,8 @@ struct Args {
     /// Works to run, of A1, A100, A300, B, C1 and C2; all by default.
     #[arg(long = "work", value_name = "NAME")]
     works: Vec<String>,
-    /// Timed frames of each, after one that is left out; the median counts.
+    /// Timed frames of each, after one that is left out, or more where they are short; the median
+    /// counts.
     #[arg(long, default_value_t = 7)]
     frames: usize,
     /// Frames of lavapipe, likewise.
@@ -187,16 +188,22 @@ fn pool(threads: usize) -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start")
 }
 
-/// Milliseconds of the median of `frames` calls after a first one.
+/// Short calls are repeated for this long, so that sleeping cores are awake and one interruption does
+/// not count.
+const AT_LEAST: Duration = Duration::from_millis(400);
+/// But not more often than this.
+const AT_MOST: usize = 500;
+
+/// Milliseconds of the median of at least `frames` calls after a first one.
 fn median(frames: usize, mut call: impl FnMut()) -> f64 {
     call();
-    let mut times: Vec<f64> = (0..frames.max(1))
-        .map(|_| {
-            let start = Instant::now();
-            call();
-            start.elapsed().as_secs_f64() * 1e3
-        })
-        .collect();
+    let begin = Instant::now();
+    let mut times = Vec::new();
+    while times.len() < frames.max(1) || (begin.elapsed() < AT_LEAST && times.len() < AT_MOST) {
+        let start = Instant::now();
+        call();
+        times.push(start.elapsed().as_secs_f64() * 1e3);
+    }
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]
 }
