@@ -24,8 +24,8 @@ fn fragment(in: Varying) -> @location(0) u32 {
 ";
 
 /// One work on the device.
-pub struct Lavapipe {
-    pub name: String,
+pub(crate) struct Lavapipe {
+    pub(crate) name: String,
     device: wgpu::Device,
     queue: wgpu::Queue,
     pipeline: wgpu::RenderPipeline,
@@ -41,7 +41,7 @@ pub struct Lavapipe {
 
 impl Lavapipe {
     /// Uploads the work to the first CPU adapter.
-    pub fn new(work: &Work) -> Result<Self, String> {
+    pub(crate) fn new(work: &Work) -> Result<Self, String> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = wgpu::Backends::VULKAN;
         descriptor.flags = wgpu::InstanceFlags::empty();
@@ -141,13 +141,13 @@ impl Lavapipe {
     }
 
     /// One frame.
-    pub fn frame(&self) -> Result<(), String> {
+    pub(crate) fn frame(&self) -> Result<(), String> {
         self.queue.submit([self.encode().finish()]);
         self.wait()
     }
 
     /// Object plus one at each sample, row by row, 0 where nothing was drawn.
-    pub fn objects(&self) -> Result<Vec<u32>, String> {
+    pub(crate) fn objects(&self) -> Result<Vec<u32>, String> {
         let row = (self.viewport.width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: None,

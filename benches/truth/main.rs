@@ -75,6 +75,7 @@ struct Row {
     schema: u32,
     kind: &'static str,
     work: &'static str,
+    what: &'static str,
     triangles: usize,
     width: u32,
     height: u32,
@@ -266,7 +267,11 @@ fn measure(args: &Args, work: &Work, level: SimdLevel) -> Result<Row, String> {
         }
     }
     let time = |pool: &rayon::ThreadPool, options: Options, image: &mut Image| {
-        pool.install(|| median(args.frames, || drop(fast::render(image, &instances, options))))
+        pool.install(|| {
+            median(args.frames, || {
+                fast::render(image, &instances, options);
+            })
+        })
     };
     let brute_one_thread_ms = time(&one, brute, &mut image);
     let brute_ms = time(&two, brute, &mut image);
@@ -276,6 +281,7 @@ fn measure(args: &Args, work: &Work, level: SimdLevel) -> Result<Row, String> {
         schema: SCHEMA,
         kind: "work",
         work: work.name,
+        what: work.what,
         triangles: work.triangle_count(),
         width: work.viewport.width,
         height: work.viewport.height,
@@ -305,13 +311,15 @@ fn done_outside(work: &fast::Work) -> u64 {
 }
 
 fn scaling(args: &Args, level: SimdLevel) -> Result<(), String> {
-    let mut line = |what: String, work: &Work, level: SimdLevel, threads: usize| {
+    let line = |what: String, work: &Work, level: SimdLevel, threads: usize| {
         let instances = work.instances();
         let mut image = Image::new(work.viewport);
         let options = |skip_hidden| Options { level, skip_hidden };
         let pool = pool(threads);
         let mut time = |skip| {
-            let mut call = || drop(fast::render(&mut image, &instances, options(skip)));
+            let mut call = || {
+                fast::render(&mut image, &instances, options(skip));
+            };
             pool.install(|| median(args.frames, &mut call))
         };
         let (brute_ms, skip_ms) = (time(false), time(true));
@@ -356,13 +364,13 @@ mod memory {
     }
 
     /// Forgets the peak so far; KiB resident now.
-    pub fn reset() -> Option<f64> {
+    pub(super) fn reset() -> Option<f64> {
         std::fs::write("/proc/self/clear_refs", "5").ok()?;
         field("VmRSS:")
     }
 
     /// MiB that the peak lies above `before`; 0 where the system does not tell.
-    pub fn peak_since(before: Option<f64>) -> f64 {
+    pub(super) fn peak_since(before: Option<f64>) -> f64 {
         let peak = before.and_then(|before| Some(field("VmHWM:")? - before));
         peak.unwrap_or(0.0).max(0.0) / 1024.0
     }

@@ -6,19 +6,19 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// One mesh many times.
-pub struct Work {
-    pub name: &'static str,
-    pub what: &'static str,
-    pub viewport: Viewport,
-    pub positions: Vec<[f32; 3]>,
-    pub triangles: Vec<[u32; 3]>,
+pub(crate) struct Work {
+    pub(crate) name: &'static str,
+    pub(crate) what: &'static str,
+    pub(crate) viewport: Viewport,
+    pub(crate) positions: Vec<[f32; 3]>,
+    pub(crate) triangles: Vec<[u32; 3]>,
     ranks: Vec<u32>,
-    pub mesh: Mesh,
-    pub matrices: Vec<[f32; 16]>,
+    pub(crate) mesh: Mesh,
+    pub(crate) matrices: Vec<[f32; 16]>,
 }
 
 /// As in the published comparisons of occlusion cullers' rasterizers.
-pub const SIZE: Viewport = Viewport { width: 1280, height: 1024 };
+pub(crate) const SIZE: Viewport = Viewport { width: 1280, height: 1024 };
 
 impl Work {
     fn new(
@@ -32,11 +32,11 @@ impl Work {
     }
 
     /// How many triangles are drawn.
-    pub fn triangle_count(&self) -> usize {
+    pub(crate) fn triangle_count(&self) -> usize {
         self.triangles.len() * self.matrices.len()
     }
 
-    pub fn draws(&self) -> impl Iterator<Item = Draw<'_>> {
+    pub(crate) fn draws(&self) -> impl Iterator<Item = Draw<'_>> {
         self.matrices.iter().enumerate().map(|(i, &clip_from_object)| Draw {
             positions: &self.positions,
             triangles: &self.triangles,
@@ -47,7 +47,7 @@ impl Work {
         })
     }
 
-    pub fn instances(&self) -> Vec<Instance<'_>> {
+    pub(crate) fn instances(&self) -> Vec<Instance<'_>> {
         let faces = Faces::CounterClockwise;
         let instance = |(i, &matrix): (usize, &[f32; 16])| {
             Instance::new(&self.mesh, (i * self.triangles.len()) as u32, matrix, faces)
@@ -56,10 +56,10 @@ impl Work {
     }
 
     /// The names, in the order of the table.
-    pub const NAMES: [&'static str; 6] = ["A1", "A100", "A300", "B", "C1", "C2"];
+    pub(crate) const NAMES: [&'static str; 6] = ["A1", "A100", "A300", "B", "C1", "C2"];
 
     /// The work of that name.
-    pub fn named(name: &str) -> Option<Self> {
+    pub(crate) fn named(name: &str) -> Option<Self> {
         match name {
             "A1" => Some(blobs("A1", 1)),
             "A100" => Some(blobs("A100", 100)),
@@ -108,7 +108,7 @@ fn placed(scale: [f64; 3], at: [f64; 3]) -> [f32; 16] {
 }
 
 /// Bumpy spheres of 69,564 triangles, about 130 pixels across, all in view.
-pub fn blobs(name: &'static str, count: usize) -> Work {
+pub(crate) fn blobs(name: &'static str, count: usize) -> Work {
     const RINGS: u32 = 187;
     let mut positions = Vec::new();
     for ring in 0..=RINGS {

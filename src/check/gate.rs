@@ -5,7 +5,7 @@ use std::fmt;
 use super::{Conservative, CountsCheck, Determinism, DeviceImage, Excess, ImageCheck};
 use crate::cull::{Culler, CullerSetup, ProxyKind};
 use crate::index::INDEXES;
-use crate::oracle::{Oracle, Sim, Stage};
+use crate::oracle::{Oracle, Sim};
 use crate::part::PartitionKnobs;
 use crate::run::{self, FrameRecord, FrameTrace, Lane, LaneInfo, Observer, RunError, Trace, World};
 use crate::scene::Scene;
@@ -137,7 +137,7 @@ pub fn judge(
             proxy: ProxyKind::Rectangle,
         })
     };
-    let stage = Stage { partition: world.partition.clone(), viewport: world.scene.viewport };
+    let stage = world.stage();
     let oracle: Box<dyn Oracle> = Box::new(Sim::new(stage));
     let name = culler().name().to_owned();
     let replay = format!("scene {} seed {} culler {name}", world.scene.name, world.scene.seed);

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use plainsight_reference::fast::{Options, SimdLevel};
 
 use crate::cull::ProxyKind;
 use crate::part::PartitionKnobs;
@@ -79,6 +80,14 @@ pub(super) struct SceneArgs {
     /// What is asked about in the place of geometry.
     #[arg(long, value_enum, default_value_t = ProxyArg::Rectangle)]
     pub(super) proxy: ProxyArg,
+    /// Vector instructions of the reference renderer (default: the widest of this machine). No
+    /// result depends on it.
+    #[arg(long, value_name = "LEVEL", value_parser = simd)]
+    pub(super) simd: Option<SimdLevel>,
+    /// Has the reference renderer process every triangle, also of clusters that are strictly behind
+    /// what is already drawn. No result depends on it.
+    #[arg(long)]
+    pub(super) every_triangle: bool,
     /// Part of the name of the Vulkan adapter to use (default: a CPU adapter such as lavapipe).
     #[arg(long)]
     pub(super) adapter: Option<String>,
@@ -196,7 +205,26 @@ fn viewport(text: &str) -> Result<Viewport, String> {
     }
 }
 
+fn simd(text: &str) -> Result<SimdLevel, String> {
+    let here = SimdLevel::available();
+    let level = text.parse()?;
+    if here.contains(&level) {
+        return Ok(level);
+    }
+    let names: Vec<String> = here.iter().map(SimdLevel::to_string).collect();
+    Err(format!("this machine has {}", names.join(", ")))
+}
+
 impl SceneArgs {
+    /// How the reference renderer draws.
+    pub(super) fn render(&self) -> Options {
+        let default = Options::default();
+        Options {
+            level: self.simd.unwrap_or(default.level),
+            skip_hidden: default.skip_hidden && !self.every_triangle,
+        }
+    }
+
     /// As the generators take them.
     pub(super) fn knobs(&self) -> Knobs {
         Knobs {

@@ -150,7 +150,8 @@ impl Named {
 
     /// The scene cut into parts.
     pub(super) fn world(&self, args: &SceneArgs) -> World {
-        World::new(self.scene.clone(), PartitionKnobs { leaf_triangles: args.leaf })
+        let knobs = PartitionKnobs { leaf_triangles: args.leaf };
+        World::new(self.scene.clone(), knobs).rendered(args.render())
     }
 }
 
@@ -185,7 +186,7 @@ impl Plan<'_> {
         bar.set_message(format!("{name}: building"));
         let world = named.world(self.args);
         let frames = world.scene.frames;
-        let stage = Stage { partition: world.partition.clone(), viewport: world.scene.viewport };
+        let stage = world.stage();
         let staged = self.oracles.stage(&stage)?;
         let entries = world.entries();
         let mut gates: Vec<Gate> = Vec::new();
@@ -225,7 +226,7 @@ impl Plan<'_> {
         last: u32,
         bar: &ProgressBar,
     ) -> Result<Vec<PartId>, CliError> {
-        let stage = Stage { partition: world.partition.clone(), viewport: world.scene.viewport };
+        let stage = world.stage();
         let staged = self.oracles.stage(&stage)?;
         let entries = world.entries();
         let mut seen = LastDrawn(Vec::new());

@@ -16,6 +16,8 @@ pub mod wgpu;
 
 use std::sync::Arc;
 
+use plainsight_reference::fast::Options;
+
 use crate::part::{PartId, Partition};
 use crate::scene::Viewport;
 
@@ -86,6 +88,16 @@ pub struct Stage {
     pub partition: Arc<Partition>,
     /// Pixels.
     pub viewport: Viewport,
+    /// How an oracle that is a reference renderer draws; no answer depends on it.
+    pub render: Options,
+}
+
+impl Stage {
+    /// Drawn in the default way.
+    #[must_use]
+    pub fn new(partition: Arc<Partition>, viewport: Viewport) -> Self {
+        Self { partition, viewport, render: Options::default() }
+    }
 }
 
 /// Why an oracle could not go on.

@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use plainsight_reference::fast::{Instance, Options};
+use plainsight_reference::fast::Instance;
 use plainsight_reference::{Draw, Faces, Image, fast};
 
 use super::proxy_mesh::box_triangles;
@@ -78,7 +78,7 @@ impl Sim {
         if !waiting.is_empty() {
             let instance = |&part: &PartId| part_instance(&stage.partition, part, matrices);
             let instances: Vec<Instance<'_>> = waiting.iter().map(instance).collect();
-            fast::draw(image, &instances, Options::default());
+            fast::draw(image, &instances, stage.render);
             waiting.clear();
         }
     }

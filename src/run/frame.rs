@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
+use plainsight_reference::fast::Options;
 
 use crate::cull::{ObjectView, View};
 use crate::effect;
 use crate::index::{Entry, Move};
 use crate::math::{ClipError, rounded_clip_matrix};
+use crate::oracle::Stage;
 use crate::part::{ObjectId, Partition, PartitionKnobs};
 use crate::scene::{Camera, Scene};
 
@@ -17,6 +19,8 @@ pub struct World {
     pub scene: Arc<Scene>,
     /// The parts.
     pub partition: Arc<Partition>,
+    /// How the reference draws; nothing that is compared depends on it.
+    pub render: Options,
     effects: effect::World,
 }
 
@@ -27,7 +31,20 @@ impl World {
         let scene = Arc::new(scene);
         let partition = Arc::new(Partition::new(&scene, knobs));
         let effects = effect::World::new(&scene);
-        Self { scene, partition, effects }
+        Self { scene, partition, render: Options::default(), effects }
+    }
+
+    /// The same, with the reference drawing in another way.
+    #[must_use]
+    pub fn rendered(self, render: Options) -> Self {
+        Self { render, ..self }
+    }
+
+    /// What its oracles work on.
+    #[must_use]
+    pub fn stage(&self) -> Stage {
+        let (partition, viewport) = (self.partition.clone(), self.scene.viewport);
+        Stage { partition, viewport, render: self.render }
     }
 
     /// What an index is built from: the boxes of frame 0.

@@ -1,6 +1,6 @@
 //! The truth of one frame: the reference's image of every part and what is visible in it.
 
-use plainsight_reference::fast::{Instance, Options};
+use plainsight_reference::fast::Instance;
 use plainsight_reference::{Image, fast};
 
 use super::{FrameState, World};
@@ -53,14 +53,15 @@ impl Truth {
 pub fn render(world: &World, state: &FrameState, parts: &[PartId], image: &mut Image) {
     let instance = |&part: &PartId| part_instance(&world.partition, part, &state.matrices);
     let instances: Vec<Instance<'_>> = parts.iter().map(instance).collect();
-    fast::render(image, &instances, Options::default());
+    fast::render(image, &instances, world.render);
 }
 
 /// Samples of frame 0 at which the cut scene shows another object or source triangle than the uncut
 /// one: what the T-junctions along the cuts cost.
 #[must_use]
 pub fn partition_difference(world: &World) -> u64 {
-    let uncut = World::new((*world.scene).clone(), PartitionKnobs { leaf_triangles: u32::MAX });
+    let knobs = PartitionKnobs { leaf_triangles: u32::MAX };
+    let uncut = World::new((*world.scene).clone(), knobs).rendered(world.render);
     let sources = |world: &World| {
         let truth = Truth::of(world, &FrameState::at(world, 0));
         let source = |draw| world.partition.source_of_draw(draw);

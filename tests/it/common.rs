@@ -6,7 +6,7 @@ use plainsight::check::Gate;
 use plainsight::cull::{CullerKind, CullerSetup, ProxyKind};
 use plainsight::index::IndexKind;
 use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware};
-use plainsight::oracle::{Always, Oracle, Sim, Stage};
+use plainsight::oracle::{Always, Oracle, Sim};
 use plainsight::part::PartitionKnobs;
 use plainsight::run::{Lane, LaneInfo, Trace, World, run};
 use plainsight::scene::Viewport;
@@ -38,7 +38,7 @@ pub(crate) fn world(scene: &str, seed: u64, scale: f64, frames: u32) -> World {
 
 /// An oracle by name.
 pub(crate) fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
-    let stage = Stage { partition: world.partition.clone(), viewport: world.scene.viewport };
+    let stage = world.stage();
     match name {
         "sim" => Box::new(Sim::new(stage)),
         "always" => Box::<Always>::default(),

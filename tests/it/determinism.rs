@@ -2,6 +2,7 @@
 
 use plainsight::cull::{CULLERS, ProxyKind};
 use plainsight::index::INDEXES;
+use plainsight_reference::fast::{Options, SimdLevel};
 
 use crate::common::{SCENES, gate, world};
 
@@ -39,4 +40,19 @@ fn hashes_are_the_same_in_every_profile() {
     let lines: Vec<String> =
         SCENES.iter().map(|scene| format!("{scene} {:016x}", hash(scene, "sim", 2))).collect();
     insta::assert_snapshot!(lines.join("\n"));
+}
+
+/// Vector instructions and what the renderer leaves out move no bit of a trace.
+#[test]
+fn simd_levels_leave_the_same_hash() {
+    for scene in SCENES {
+        let first = hash(scene, "sim", 2);
+        for level in SimdLevel::available() {
+            for skip_hidden in [true, false] {
+                let world = world(scene, 5, 0.02, 4).rendered(Options { level, skip_hidden });
+                let (trace, _) = gate(&world, CULLERS[0], INDEXES[0], "sim", ProxyKind::Rectangle);
+                assert_eq!(trace.hash(), first, "{scene} {level} {skip_hidden}");
+            }
+        }
+    }
 }

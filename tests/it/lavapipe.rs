@@ -83,7 +83,7 @@ fn coverage_and_depth_by_class() {
         let object = |mesh| Object { mesh, placement: Placement::IDENTITY };
         scene.objects = (0..triangles.len() as u32).map(object).collect();
         let partition = Arc::new(Partition::new(&scene, PartitionKnobs::default()));
-        let stage = Stage { partition: partition.clone(), viewport: VIEWPORT };
+        let stage = Stage::new(partition.clone(), VIEWPORT);
         let mut device = Hardware::new(&GpuStage::new(gpu(), &stage).unwrap()).unwrap();
         let matrices = vec![rounded_clip_matrix(&clip_from_view()); triangles.len()];
         device.begin_frame(&FrameView { frame: 0, clip_from_object: &matrices }).unwrap();

@@ -28,7 +28,7 @@ fn oracles() -> (Viewport, Vec<Box<dyn Oracle>>) {
     scene.objects = vec![Object { mesh: 0, placement: Placement::IDENTITY }];
     scene.effects = Effects::default();
     let partition = Arc::new(Partition::new(&scene, PartitionKnobs::default()));
-    let stage = Stage { partition, viewport };
+    let stage = Stage::new(partition, viewport);
     let device = Hardware::new(&GpuStage::new(crate::common::gpu(), &stage).unwrap()).unwrap();
     (viewport, vec![Box::new(Sim::new(stage)), Box::new(device)])
 }
