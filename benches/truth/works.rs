@@ -64,9 +64,9 @@ impl Work {
             "A1" => Some(blobs("A1", 1)),
             "A100" => Some(blobs("A100", 100)),
             "A300" => Some(blobs("A300", 300)),
-            "B" => Some(street()),
-            "C1" => Some(screen_triangles(("C1", "small triangles"), 1_000_000, 10.0)),
-            "C2" => Some(screen_triangles(("C2", "large triangles"), 2_000, 100_000.0)),
+            "B" => Some(street(16_000)),
+            "C1" => Some(screen(("C1", "small triangles"), &[(1_000_000, 10.0)])),
+            "C2" => Some(screen(("C2", "large triangles"), &[(2_000, 100_000.0)])),
             _ => None,
         }
     }
@@ -147,15 +147,15 @@ pub(crate) fn blobs(name: &'static str, count: usize) -> Work {
     Work::new((name, "dense blobs"), (positions, triangles), matrices)
 }
 
-/// 16,000 boxes along streets, seen from between them.
-fn street() -> Work {
+/// Boxes along streets, 80 abreast, seen from between them.
+pub(crate) fn street(count: u32) -> Work {
     let positions: Vec<[f32; 3]> =
         (0..8_u32).map(|i| [0, 1, 2].map(|axis| (i >> axis & 1) as f32 - 0.5)).collect();
     let faces: [[u32; 4]; 6] =
         [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     let mut dice = Dice::new(2);
-    let matrices = (0..16_000)
+    let matrices = (0..count)
         .map(|i| {
             let (column, row) = (f64::from(i % 80) - 39.5, f64::from(i / 80));
             let height = dice.between(4.0, 30.0);
@@ -168,25 +168,35 @@ fn street() -> Work {
     Work::new(("B", "boxes in a street"), (positions, triangles), matrices)
 }
 
-/// Triangles of about `area` pixels anywhere on the screen, at any depth, in random order.
-fn screen_triangles(name: (&'static str, &'static str), count: u32, area: f64) -> Work {
+/// Small and large triangles.
+pub(crate) fn mixed_triangles(small: u32, large: u32) -> Work {
+    screen(("mixed", "small and large triangles"), &[(small, 10.0), (large, 100_000.0)])
+}
+
+/// Triangles (how many, of about how many pixels) anywhere on the screen, at any depth, in random
+/// order.
+fn screen(name: (&'static str, &'static str), kinds: &[(u32, f64)]) -> Work {
     let mut dice = Dice::new(3);
     let (width, height) = (f64::from(SIZE.width), f64::from(SIZE.height));
-    // The circumscribed circle of an equilateral triangle: area = 3·√3/4·r².
-    let radius = libm::sqrt(area / 1.299_038_105_676_658);
     let mut positions = Vec::new();
-    for _ in 0..count {
-        let center = [dice.between(0.0, width), dice.between(0.0, height)];
-        let depth = dice.between(0.05, 0.95);
-        let turn = dice.between(0.0, std::f64::consts::TAU);
-        for corner in 0..3 {
-            let round = turn + std::f64::consts::TAU * f64::from(corner) / 3.0;
-            let x = center[0] + radius * libm::cos(round);
-            let y = center[1] + radius * libm::sin(round);
-            let z = depth + dice.between(-0.04, 0.04);
-            positions.push([x / width * 2.0 - 1.0, y / height * 2.0 - 1.0, z].map(|c| c as f32));
+    for &(count, area) in kinds {
+        // The circumscribed circle of an equilateral triangle: area = 3·√3/4·r².
+        let radius = libm::sqrt(area / 1.299_038_105_676_658);
+        for _ in 0..count {
+            let center = [dice.between(0.0, width), dice.between(0.0, height)];
+            let depth = dice.between(0.05, 0.95);
+            let turn = dice.between(0.0, std::f64::consts::TAU);
+            for corner in 0..3 {
+                let round = turn + std::f64::consts::TAU * f64::from(corner) / 3.0;
+                let x = center[0] + radius * libm::cos(round);
+                let y = center[1] + radius * libm::sin(round);
+                let z = depth + dice.between(-0.04, 0.04);
+                positions
+                    .push([x / width * 2.0 - 1.0, y / height * 2.0 - 1.0, z].map(|c| c as f32));
+            }
         }
     }
+    let count = positions.len() as u32 / 3;
     let triangles = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let identity = std::array::from_fn(|i| if i % 5 == 0 { 1.0 } else { 0.0 });
     Work::new(name, (positions, triangles), vec![identity])

@@ -6,6 +6,8 @@ use super::level::LANES;
 /// Most triangles of a cluster: five vectors of sixteen. A compact patch of a smooth mesh of that many
 /// has some 55 vertices.
 const CLUSTER_TRIANGLES: usize = 80;
+/// Triangles this many times as large as the mesh's median have clusters of their own.
+const LARGE: f32 = 8.0;
 /// Most vertices of a cluster: as many 32-bit words as four AVX-512 registers hold, for the look-up of
 /// corners (two shuffles of two registers).
 pub(crate) const CLUSTER_VERTICES: usize = 64;
@@ -75,14 +77,12 @@ impl Mesh {
             assert!(position.iter().all(|c| c.is_finite()), "vertex {vertex} is not finite");
             position
         };
-        let centers: Vec<[f32; 3]> = triangles
-            .iter()
-            .map(|triangle| {
-                let [a, b, c] = triangle.map(corner);
-                // Halved first: the sum of three huge coordinates is no finite number.
-                std::array::from_fn(|axis| a[axis] * 0.5 + b[axis] * 0.5 + c[axis] * 0.5)
-            })
-            .collect();
+        let corners = || triangles.iter().map(|triangle| triangle.map(corner));
+        // Halved first: the sum of three huge coordinates is no finite number.
+        let center =
+            |[a, b, c]: [[f32; 3]; 3], axis: usize| a[axis] * 0.5 + b[axis] * 0.5 + c[axis] * 0.5;
+        let centers: Vec<[f32; 3]> =
+            corners().map(|triangle| [0, 1, 2].map(|axis| center(triangle, axis))).collect();
         let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
         let mut mesh = Self {
             triangles: triangles.len(),
@@ -91,7 +91,10 @@ impl Mesh {
         };
         let mut local = vec![u32::MAX; positions.len()];
         let source = Source { positions, triangles, ranks, centers: &centers };
-        mesh.split(&source, &mut order, &mut local);
+        let large = large_first(&mut order, &corners().map(extent).collect::<Vec<_>>());
+        let (large, small) = order.split_at_mut(large);
+        mesh.split(&source, large, &mut local);
+        mesh.split(&source, small, &mut local);
         mesh
     }
 
@@ -213,6 +216,30 @@ impl Mesh {
             triangles: order.len() as u8,
         });
     }
+}
+
+/// Longest side of a triangle's box, halved.
+fn extent([a, b, c]: [[f32; 3]; 3]) -> f32 {
+    let side = |axis: usize| {
+        let [a, b, c] = [a[axis] * 0.5, b[axis] * 0.5, c[axis] * 0.5];
+        a.max(b).max(c) - a.min(b).min(c)
+    };
+    side(0).max(side(1)).max(side(2))
+}
+
+/// Brings the triangles that are much larger than most to the front; how many. Among small ones each
+/// would make a whole cluster large.
+fn large_first(order: &mut [u32], extents: &[f32]) -> usize {
+    if order.len() <= CLUSTER_TRIANGLES {
+        return 0;
+    }
+    let middle = order.len() / 2;
+    let by_extent =
+        |&a: &u32, &b: &u32| extents[a as usize].total_cmp(&extents[b as usize]).then(a.cmp(&b));
+    let (_, &mut median, _) = order.select_nth_unstable_by(middle, by_extent);
+    let limit = extents[median as usize] * LARGE;
+    order.sort_unstable_by_key(|&t| (extents[t as usize] <= limit, t));
+    order.partition_point(|&t| extents[t as usize] > limit)
 }
 
 /// What a mesh is built from.
