@@ -51,7 +51,7 @@ fn fragments(viewport: Viewport, draw: &Draw<'_>, mut emit: impl FnMut(usize, us
                         e[i] > 0 || (e[i] == 0 && top_left(opposite(i).0, opposite(i).1))
                     };
                     if (0..3).all(inside) {
-                        let depth = depth(e, v.map(|v| v.z), area);
+                        let depth = depth(e.map(|e| e as f64), v.map(|v| v.z), area);
                         emit(column as usize, row as usize, depth, draw.stored_id(i));
                     }
                 }

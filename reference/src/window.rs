@@ -98,8 +98,7 @@ pub(crate) fn top_left(a: WindowVertex, b: WindowVertex) -> bool {
 }
 
 /// The written depth at a sample, from exact non-negative edge values.
-pub(crate) fn depth(e: [i64; 3], z: [f32; 3], area: i64) -> f32 {
-    let [e0, e1, e2] = e.map(|e| e as f64);
+pub(crate) fn depth([e0, e1, e2]: [f64; 3], z: [f32; 3], area: i64) -> f32 {
     let [z0, z1, z2] = z.map(f64::from);
     (((e0 * z0 + e1 * z1) + e2 * z2) / area as f64) as f32
 }

@@ -65,7 +65,7 @@ fn passing(image: &Image, wide: &Wide, [x0, y0, x1, y1]: [usize; 4]) -> u64 {
         for column in x0..x1 {
             if (0..3).all(|i| e[i] >= bias[i]) {
                 let stored = f32::from_bits((image.word_at(column, row) >> 32) as u32);
-                passed += u64::from(depth(e, z, wide.triangle.area) <= stored);
+                passed += u64::from(depth(e.map(|e| e as f64), z, wide.triangle.area) <= stored);
             }
             for (e, (a, b)) in e.iter_mut().zip(&ends) {
                 *e += SUBPIXELS * (i64::from(a.y) - i64::from(b.y));

@@ -51,22 +51,32 @@ pub(crate) struct Frame<'a> {
 /// Units that one task projects.
 const UNITS_PER_TASK: usize = 256;
 
+/// The units (instance, first cluster) of the instances.
+pub(crate) fn names(instances: &[Instance<'_>]) -> Vec<(u32, u32)> {
+    let mut names = Vec::new();
+    for (i, instance) in instances.iter().enumerate() {
+        let clusters = instance.mesh.clusters.len() as u32;
+        names.extend((0..clusters).step_by(UNIT_CLUSTERS).map(|first| (i as u32, first)));
+    }
+    names
+}
+
 impl<'a> Frame<'a> {
-    /// Projects all clusters and sets up the triangles of the wide ones.
+    /// Projects all clusters of the units and sets up the triangles of the wide ones; without vectors
+    /// all are wide.
     pub(crate) fn new(
-        level: Level,
+        level: Option<Level>,
         viewport: Viewport,
         instances: &'a [Instance<'a>],
+        names: &[(u32, u32)],
         skips: bool,
     ) -> (Self, Work) {
-        let mut names = Vec::new();
-        for (i, instance) in instances.iter().enumerate() {
-            let clusters = instance.mesh.clusters.len() as u32;
-            names.extend((0..clusters).step_by(UNIT_CLUSTERS).map(|first| (i as u32, first)));
-        }
         let project = |names: &[(u32, u32)]| {
             let mut task = Task::new(viewport, instances);
-            dispatch!(level, s => task.project(s, names));
+            match level {
+                Some(level) => dispatch!(level, s => task.project(s, names)),
+                None => task.all_wide(names),
+            }
             task
         };
         let tasks: Vec<Task<'_>> = names.par_chunks(UNITS_PER_TASK).map(project).collect();
@@ -182,6 +192,17 @@ impl<'a> Task<'a> {
                 self.unit(instance, first, [from, from + clusters as u32]);
             }
             rest = &rest[taken..];
+        }
+    }
+
+    /// Units whose clusters' places are not asked for.
+    fn all_wide(&mut self, names: &[(u32, u32)]) {
+        for &(instance, first) in names {
+            let mesh = self.instances[instance as usize].mesh;
+            let from = self.lists.places.len();
+            let to = from + (mesh.clusters.len() - first as usize).min(UNIT_CLUSTERS);
+            self.lists.places.resize(to, Place::Wide);
+            self.unit(instance, first, [from as u32, to as u32]);
         }
     }
 

@@ -13,7 +13,7 @@ pub(crate) const LANES: usize = 16;
 /// A set of vector instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SimdLevel {
-    /// Loops over lanes, compiled for the target's baseline.
+    /// One sample after the other. Every triangle is set up one by one, none is left out as hidden.
     Scalar,
     /// x86: 128 bits.
     Sse2,
@@ -35,7 +35,8 @@ impl SimdLevel {
     /// The levels that this machine has, the widest last.
     #[must_use]
     pub fn available() -> Vec<Self> {
-        Self::ALL.into_iter().filter(|level| level.token().is_some()).collect()
+        let here = |level: &Self| *level == Self::Scalar || level.token().is_some();
+        Self::ALL.into_iter().filter(here).collect()
     }
 
     /// The widest level that this machine has.
@@ -44,10 +45,10 @@ impl SimdLevel {
         Self::available().into_iter().next_back().unwrap_or(Self::Scalar)
     }
 
-    /// Its instructions, or those of the best level below it that the machine has.
-    pub(crate) fn or_below(self) -> Level {
+    /// Its instructions, or those of the best level below it that the machine has; `None` for none.
+    pub(crate) fn or_below(self) -> Option<Level> {
         let below = Self::ALL.into_iter().rev().filter(|&level| level <= self);
-        below.filter_map(Self::token).next().unwrap_or(Level::fallback())
+        below.filter_map(Self::token).next()
     }
 
     /// `None` where the machine does not have it.
@@ -55,10 +56,9 @@ impl SimdLevel {
     pub(crate) fn token(self) -> Option<Level> {
         let best = Level::new();
         match self {
-            Self::Scalar => Some(Level::fallback()),
+            Self::Scalar | Self::Neon => None,
             Self::Sse2 => best.as_sse2().map(Level::Sse2),
             Self::Sse4_2 => best.as_sse4_2().map(Level::Sse4_2),
-            Self::Neon => None,
             Self::Avx2 => best.as_avx2().map(Level::Avx2),
             Self::Avx512 => best.as_avx512().map(Level::Avx512),
         }
@@ -67,17 +67,14 @@ impl SimdLevel {
     /// `None` where the machine does not have it.
     #[cfg(target_arch = "aarch64")]
     pub(crate) fn token(self) -> Option<Level> {
-        match self {
-            Self::Scalar => Some(Level::fallback()),
-            Self::Neon => Level::new().as_neon().map(Level::Neon),
-            _ => None,
-        }
+        (self == Self::Neon).then(|| Level::new().as_neon().map(Level::Neon)).flatten()
     }
 
     /// `None` where the machine does not have it.
     #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     pub(crate) fn token(self) -> Option<Level> {
-        (self == Self::Scalar).then(Level::fallback)
+        let _ = self;
+        None
     }
 }
 

@@ -35,6 +35,7 @@ mod level;
 mod lookup;
 mod mesh;
 mod narrow;
+mod painter;
 mod region;
 mod wide;
 
@@ -51,6 +52,7 @@ use crate::draw::Faces;
 use crate::image::{Image, Region};
 use frame::Frame;
 use narrow::Room;
+use painter::{Plain, Vectors};
 
 /// A mesh somewhere.
 #[derive(Clone, Copy, Debug)]
@@ -139,11 +141,41 @@ pub fn render(image: &mut Image, instances: &[Instance<'_>], options: Options) -
     paint(image, instances, options, true)
 }
 
+/// Units that go through the plain painter together: at most a million triangles, 64 bytes each.
+const PLAIN_UNITS: usize = 200;
+
 fn paint(image: &mut Image, instances: &[Instance<'_>], options: Options, clears: bool) -> Work {
-    let viewport = image.viewport();
     let level = options.level.or_below();
-    let (frame, work) = Frame::new(level, viewport, instances, options.skip_hidden);
-    let keys = frame.regions(viewport);
+    let names = frame::names(instances);
+    let Some(level) = level else {
+        if clears {
+            image.clear();
+        }
+        let parts = names.chunks(PLAIN_UNITS).map(|names| {
+            let (frame, work) =
+                Frame::new(None, image.viewport(), instances, names, options.skip_hidden);
+            let draw = |keys: &[u64], region: &mut Region<'_>, room: &mut Room| {
+                region::draw(Plain, &frame, keys, region, room)
+            };
+            work + each_region(image, &frame, false, draw)
+        });
+        return parts.fold(Work::default(), Add::add);
+    };
+    let (frame, work) =
+        Frame::new(Some(level), image.viewport(), instances, &names, options.skip_hidden);
+    let draw = |keys: &[u64], region: &mut Region<'_>, room: &mut Room| dispatch!(level, s => region::draw(Vectors(s), &frame, keys, region, room));
+    work + each_region(image, &frame, clears, draw)
+}
+
+/// Calls `draw` for each region that something may show in, on all threads, with the sorted keys of
+/// its units.
+fn each_region(
+    image: &mut Image,
+    frame: &Frame<'_>,
+    clears: bool,
+    draw: impl Fn(&[u64], &mut Region<'_>, &mut Room) -> Work + Sync,
+) -> Work {
+    let keys = frame.regions(image.viewport());
     let mut regions: Vec<(Region<'_>, Vec<u64>)> = image.regions().zip(keys).collect();
     // The fullest first, so that no thread is left with one at the end.
     regions.sort_by_key(|(region, keys)| (std::cmp::Reverse(keys.len()), region.origin));
@@ -154,12 +186,9 @@ fn paint(image: &mut Image, instances: &[Instance<'_>], options: Options, clears
             if clears {
                 region.clear();
             }
-            if keys.is_empty() {
-                return Work::default();
-            }
             keys.sort_unstable();
-            dispatch!(level, s => region::draw(s, &frame, keys, region, room))
+            if keys.is_empty() { Work::default() } else { draw(keys, region, room) }
         })
         .collect();
-    drawn.into_iter().fold(work, Add::add)
+    drawn.into_iter().fold(Work::default(), Add::add)
 }

@@ -1,11 +1,9 @@
 //! One region of the image: everything that may show in it, front to back.
 
-use fearless_simd::prelude::*;
-use fearless_simd::{Simd, i64x8};
-
 use super::bound::Place;
 use super::frame::{Frame, Unit};
-use super::narrow::{self, Job, Room};
+use super::narrow::{Job, Room};
+use super::painter::Painter;
 use super::{Work, wide};
 use crate::image::{BLOCK, BLOCKS, REGION, Region};
 
@@ -14,8 +12,8 @@ const WIDE: u32 = 1 << 31;
 
 /// Draws the units, whose keys (nearest depth, then number) are sorted, into the region.
 #[inline(always)]
-pub(crate) fn draw<S: Simd>(
-    s: S,
+pub(crate) fn draw<P: Painter>(
+    painter: P,
     frame: &Frame<'_>,
     keys: &[u64],
     region: &mut Region<'_>,
@@ -23,10 +21,12 @@ pub(crate) fn draw<S: Simd>(
 ) -> Work {
     let mut work = Work::default();
     let mut items = Vec::new();
-    let mut deepest = region.deepest(s);
+    let mut deepest = region.deepest();
     for &key in keys {
         let unit = &frame.units[key as u32 as usize];
-        if frame.skips && (unit.near > deepest || region.hidden(s, unit.min, unit.max, unit.near)) {
+        if frame.skips
+            && (unit.near > deepest || region.hidden(painter, unit.min, unit.max, unit.near))
+        {
             work.units_hidden += 1;
             continue;
         }
@@ -39,15 +39,15 @@ pub(crate) fn draw<S: Simd>(
             if number & WIDE != 0 {
                 let triangle = &frame.wide(unit)[(number & !WIDE) as usize];
                 if near <= deepest {
-                    wide::draw(s, triangle, region);
-                    deepest = region.deepest(s);
+                    wide::draw(painter, triangle, region);
+                    deepest = region.deepest();
                 }
                 continue;
             }
             let Place::Narrow { min, max, near } = frame.places(unit)[number as usize] else {
                 continue;
             };
-            if frame.skips && (near > deepest || region.hidden(s, min, max, near)) {
+            if frame.skips && (near > deepest || region.hidden(painter, min, max, near)) {
                 work.clusters_hidden += 1;
                 continue;
             }
@@ -64,11 +64,11 @@ pub(crate) fn draw<S: Simd>(
                 half: frame.half,
                 min,
             };
-            narrow::draw(s, &job, region, room);
+            painter.cluster(&job, region, room);
         }
-        deepest = region.deepest(s);
+        deepest = region.deepest();
     }
-    region.renew_all(s);
+    region.renew_all(painter);
     work
 }
 
@@ -97,35 +97,22 @@ fn list(frame: &Frame<'_>, unit: &Unit, region: &Region<'_>, items: &mut Vec<u64
 impl Region<'_> {
     /// Bits of a depth that no sample lies behind.
     #[inline(always)]
-    fn deepest<S: Simd>(&self, _: S) -> u32 {
+    fn deepest(&self) -> u32 {
         self.far.iter().copied().fold(0, u32::max)
     }
 
-    /// Makes the bound of a block its farthest depth.
     #[inline(always)]
-    pub(crate) fn renew<S: Simd>(&mut self, s: S, block: usize) {
-        let first = block / BLOCKS * BLOCK * REGION + block % BLOCKS * BLOCK;
-        let mut most = i64x8::splat(s, 0);
-        for line in 0..BLOCK {
-            let place = first + line * REGION;
-            most = most.max(i64x8::from_slice(s, &self.words[place..place + BLOCK]));
-        }
-        self.far[block] = (most.reduce_max() >> 32) as u32;
-        self.stale[block] = false;
-    }
-
-    #[inline(always)]
-    fn renew_all<S: Simd>(&mut self, s: S) {
+    fn renew_all<P: Painter>(&mut self, painter: P) {
         for block in 0..BLOCKS * BLOCKS {
             if self.stale[block] {
-                self.renew(s, block);
+                painter.renew(self, block);
             }
         }
     }
 
     /// Whether nothing at depth `near` or behind shows on the pixels from `min` to `max`.
     #[inline(always)]
-    fn hidden<S: Simd>(&mut self, s: S, min: [i16; 2], max: [i16; 2], near: u32) -> bool {
+    fn hidden<P: Painter>(&mut self, painter: P, min: [i16; 2], max: [i16; 2], near: u32) -> bool {
         let block = |axis: usize, pixel: i16| {
             (i32::from(pixel) - self.origin[axis]).clamp(0, REGION as i32 - 1) as usize / BLOCK
         };
@@ -137,7 +124,7 @@ impl Region<'_> {
                     if !self.stale[block] {
                         return false;
                     }
-                    self.renew(s, block);
+                    painter.renew(self, block);
                     if near <= self.far[block] {
                         return false;
                     }

@@ -4,6 +4,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f64x8, i32x8, i64x8, mask64x8};
 
 use super::narrow::{depth_words, nearest};
+use super::painter::Painter;
 use crate::image::{BLOCK, BLOCKS, REGION, Region, Viewport};
 use crate::window::{Oriented, SUBPIXELS, edge, top_left};
 
@@ -57,7 +58,7 @@ impl Wide {
 
 /// One edge against samples, counted from the first sample of a region.
 #[derive(Clone, Copy)]
-struct Edge {
+pub(crate) struct Edge {
     /// ⌊(e − bias) / 256⌋, of the same sign as e − bias: the samples' steps are whole multiples of 256.
     value: i64,
     /// Its change from a column to the next, and from a row to the next.
@@ -81,11 +82,12 @@ impl Edge {
         }
     }
 
-    fn at(&self, [x, y]: [i64; 2]) -> i64 {
+    pub(crate) fn at(&self, [x, y]: [i64; 2]) -> i64 {
         self.value + self.right * x + self.down * y
     }
 
-    fn exact_at(&self, [x, y]: [i64; 2]) -> f64 {
+    /// The edge value itself: whole and below 2⁴⁹, so f64 holds it.
+    pub(crate) fn exact_at(&self, [x, y]: [i64; 2]) -> f64 {
         self.exact + (SUBPIXELS * (self.right * x + self.down * y)) as f64
     }
 
@@ -136,7 +138,7 @@ impl Plane {
 
 /// Draws one triangle into one region.
 #[inline(always)]
-pub(crate) fn draw<S: Simd>(s: S, wide: &Wide, region: &mut Region<'_>) {
+pub(crate) fn draw<P: Painter>(painter: P, wide: &Wide, region: &mut Region<'_>) {
     let triangle = &wide.triangle;
     let block = |axis: usize, pixel: i16| {
         (i32::from(pixel) - region.origin[axis]).clamp(0, REGION as i32 - 1) as usize / BLOCK
@@ -158,8 +160,8 @@ pub(crate) fn draw<S: Simd>(s: S, wide: &Wide, region: &mut Region<'_>) {
             if near > far || plane.hidden(place, far) {
                 continue;
             }
-            if samples(s, wide, region, &edges, [column, row]) {
-                region.renew(s, row * BLOCKS + column);
+            if painter.block(wide, region, &edges, [column, row]) {
+                painter.renew(region, row * BLOCKS + column);
             }
         }
     }
@@ -167,7 +169,7 @@ pub(crate) fn draw<S: Simd>(s: S, wide: &Wide, region: &mut Region<'_>) {
 
 /// Draws the triangle into one block; whether it reached any sample.
 #[inline(always)]
-fn samples<S: Simd>(
+pub(crate) fn samples<S: Simd>(
     s: S,
     wide: &Wide,
     region: &mut Region<'_>,

@@ -1,0 +1,104 @@
+//! The two ways to draw into a region: with vectors, and plainly, sample by sample. The plain way is
+//! what runs where a machine has no vectors, and a second opinion in tests.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, i64x8};
+
+use super::narrow::{self, Job, Room, nearest};
+use super::wide::{self, Edge, Wide};
+use crate::image::{BLOCK, BLOCKS, REGION, Region};
+use crate::window::depth;
+
+/// What draws into a region.
+pub(crate) trait Painter: Copy {
+    /// Draws a wide triangle into one block (column and row); whether it reached any sample.
+    fn block(
+        self,
+        wide: &Wide,
+        region: &mut Region<'_>,
+        edges: &[Edge; 3],
+        block: [usize; 2],
+    ) -> bool;
+
+    /// Draws a cluster whose place is narrow.
+    fn cluster(self, job: &Job<'_>, region: &mut Region<'_>, room: &mut Room);
+
+    /// Makes the bound of a block its farthest depth.
+    fn renew(self, region: &mut Region<'_>, block: usize);
+}
+
+/// Many samples or triangles at a time.
+#[derive(Clone, Copy)]
+pub(crate) struct Vectors<S>(pub(crate) S);
+
+impl<S: Simd> Painter for Vectors<S> {
+    #[inline(always)]
+    fn block(
+        self,
+        wide: &Wide,
+        region: &mut Region<'_>,
+        edges: &[Edge; 3],
+        block: [usize; 2],
+    ) -> bool {
+        wide::samples(self.0, wide, region, edges, block)
+    }
+
+    #[inline(always)]
+    fn cluster(self, job: &Job<'_>, region: &mut Region<'_>, room: &mut Room) {
+        narrow::draw(self.0, job, region, room);
+    }
+
+    #[inline(always)]
+    fn renew(self, region: &mut Region<'_>, block: usize) {
+        let first = block / BLOCKS * BLOCK * REGION + block % BLOCKS * BLOCK;
+        let mut most = i64x8::splat(self.0, 0);
+        for line in 0..BLOCK {
+            let place = first + line * REGION;
+            most = most.max(i64x8::from_slice(self.0, &region.words[place..place + BLOCK]));
+        }
+        region.far[block] = (most.reduce_max() >> 32) as u32;
+        region.stale[block] = false;
+    }
+}
+
+/// One sample at a time. Its frames hold no narrow clusters.
+#[derive(Clone, Copy)]
+pub(crate) struct Plain;
+
+impl Painter for Plain {
+    fn block(
+        self,
+        wide: &Wide,
+        region: &mut Region<'_>,
+        edges: &[Edge; 3],
+        [column, row]: [usize; 2],
+    ) -> bool {
+        let z = wide.triangle.v.map(|v| v.z);
+        let nearest = nearest(z);
+        let mut any = false;
+        for i in 0..BLOCK * BLOCK {
+            let [x, y] = [column * BLOCK + i % BLOCK, row * BLOCK + i / BLOCK];
+            let at = [x as i64, y as i64];
+            let stored = &mut region.words[y * REGION + x];
+            if edges.iter().all(|edge| edge.at(at) >= 0) && nearest <= *stored {
+                let e = [0, 1, 2].map(|i| edges[i].exact_at(at));
+                let bits = depth(e, z, wide.triangle.area).to_bits();
+                *stored = (*stored).min(i64::from(bits) << 32 | i64::from(wide.id));
+                any = true;
+            }
+        }
+        any
+    }
+
+    fn cluster(self, _: &Job<'_>, _: &mut Region<'_>, _: &mut Room) {
+        unreachable!("a plain frame has wide clusters only");
+    }
+
+    fn renew(self, region: &mut Region<'_>, block: usize) {
+        let first = block / BLOCKS * BLOCK * REGION + block % BLOCKS * BLOCK;
+        let word = |i: usize| region.words[first + i / BLOCK * REGION + i % BLOCK];
+        let most = (0..BLOCK * BLOCK).map(word).max().unwrap_or(0);
+        region.far[block] = (most >> 32) as u32;
+        region.stale[block] = false;
+    }
+}
