@@ -1,4 +1,44 @@
-//! The renderer that runs use: equal to [`crate::naive`] bit for bit.
+//! The renderer that runs use: equal to [`crate::naive`] bit for bit, at every SIMD level, on any number
+//! of threads.
+//!
+//! # How it works
+//! A [`Mesh`] is sorted once into *clusters* of up to 80 neighbouring triangles with at most 64 vertices.
+//! For a frame all boxes of clusters are projected, sixteen at a time (`bound`). A *narrow* cluster is
+//! small on the screen and wholly before the eye; the triangles of the others, *wide* ones, are
+//! transformed, clipped and snapped one by one (`frame`). The image is cut into regions of 128 × 128
+//! samples that fit the second level cache; each belongs to one thread at a time and takes whatever may
+//! show in it, front to back (`region`). Small triangles go through vectors of sixteen triangles
+//! (`narrow`), large ones block by block of 8 × 8 samples (`wide`). For each block the image keeps a
+//! bound of its farthest depth; clusters, triangles and blocks behind it are left out (Greene, Kass &
+//! Miller 1993, *Hierarchical Z-buffer visibility*; the order front to back is theirs too). Regions
+//! owned by threads are the sort-first case of Molnar, Cox, Ellsworth & Fuchs 1994, *A sorting
+//! classification of parallel rendering*.
+//!
+//! # Why it is exact
+//! 1. **Order does not matter.** The image is the minimum of (depth, draw index) at each sample over all
+//!    fragments, and a minimum takes its operands in any order. So neither sorting, nor threads, nor
+//!    regions, nor drawing a fragment twice (in the column that two vectors share) moves a bit.
+//! 2. **The same operations.** Vectors run the written operations of the transform, the division, the
+//!    scaling and the snapping, unfused and in the written order; each is one IEEE operation a lane. A
+//!    cluster's own copy of a vertex has the same bits as the mesh's, so it is snapped to the same place.
+//! 3. **Narrow clusters need no clipping.** `bound` proves for each of them that no vertex is beyond near
+//!    or far, that w is positive and that all lie on at most 120 × 120 pixels that meet the image, well
+//!    within the guard band: the clipper would hand their triangles back untouched.
+//! 4. **Edge values are whole numbers** that fit their type: within a narrow cluster i32 (`bound`,
+//!    `NARROW_PIXELS`), else i64. Blocks test signs on ⌊(e − bias) / 256⌋, which has the sign of e − bias,
+//!    because samples step by whole multiples of 256; where that does not fit i32 it is clamped to a
+//!    value that keeps its sign all over the block (`wide`, `SATURATED`).
+//! 5. **Depth is the written expression** on the same exact edge values; they are below 2⁵³, so f64
+//!    holds them, however they were added up. Exchanged vertices 1 and 2 are exchanged in both renderers.
+//! 6. **A triangle whose box holds no sample covers none**, and of the tiny boxes of up to 2 × 2 samples
+//!    all four are tested.
+//! 7. **What is left out is strictly behind.** A fragment's depth is never below its nearest vertex': the
+//!    f64 sum of non-negative terms errs by less than 4·2⁻⁵³ of itself, and rounding to f32 is monotone
+//!    with that vertex' depth among its values. A cluster's bound is below all depths of its vertices
+//!    (`bound`), a block's bound below the plane of the triangle by the plane's error and compared with
+//!    the next f32 after the stored depth (`wide`). All are compared with *less*, never *less or equal*,
+//!    so a tie still meets the draw index. Bounds of blocks are never too near: depths only fall.
+//! 8. **Scalar** is a way of its own, `Plain`: all clusters are wide and samples are tested one by one.
 
 /// The three values of an expression for `i` = 0, 1, 2. An array's `map` and `from_fn` are calls, and a
 /// call to a function compiled without the vector instructions passes vectors through memory.
