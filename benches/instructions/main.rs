@@ -7,7 +7,7 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, clippy::disallowed_methods)]
 
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the other bench uses the rest")]
 #[path = "../truth/works.rs"]
 mod works;
 

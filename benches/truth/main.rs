@@ -7,6 +7,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, clippy::disallowed_methods)]
 
 mod lavapipe;
+#[allow(dead_code, reason = "other benches use the rest")]
 mod works;
 
 use std::time::{Duration, Instant};

@@ -248,3 +248,117 @@ impl<S: Simd> Extremes<S> {
         self.high_top = self.high_top.max(w - y);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{Level, dispatch};
+
+    use super::*;
+    use crate::draw::transform;
+    use crate::window::Window;
+
+    struct Dice(u64);
+
+    impl Dice {
+        fn between(&mut self, low: f32, high: f32) -> f32 {
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            low + (high - low) * ((self.0 >> 40) as f32 / (1_u64 << 24) as f32)
+        }
+    }
+
+    const VIEWPORT: Viewport = Viewport { width: 1000, height: 700 };
+
+    /// A camera at `eye` that looks along −z, with everything far from the origin where `eye` is.
+    fn matrix([x, y, z]: [f32; 3]) -> [f32; 16] {
+        let (a, b) = (-50.0 / 49.5_f64, -25.0 / 49.5_f64);
+        let [x, y, z] = [x, y, z].map(f64::from);
+        let columns = [
+            [1.2, 0.0, 0.0, 0.0],
+            [0.0, 1.6, 0.0, 0.0],
+            [0.0, 0.0, a, -1.0],
+            [-1.2 * x, -1.6 * y, -a * z + b, z],
+        ];
+        std::array::from_fn(|i| columns[i / 4][i % 4] as f32)
+    }
+
+    /// Sixteen boxes of a few vertices each, so small that mostly the margins decide, and what the
+    /// vertices become.
+    fn round(dice: &mut Dice, far: f32) -> (Batch, Vec<Vec<[f32; 4]>>) {
+        let mut batch = Batch::new();
+        let mut clips = Vec::new();
+        for lane in 0..LANES {
+            let eye = [0; 3].map(|_| dice.between(-far, far));
+            let m = matrix(eye);
+            let depth = dice.between(-0.2, 60.0);
+            let middle = [
+                eye[0] + dice.between(-1.2, 1.2) * depth,
+                eye[1] + dice.between(-0.9, 0.9) * depth,
+                eye[2] - depth,
+            ];
+            let size = dice.between(0.0, 0.02);
+            let points: Vec<[f32; 3]> =
+                (0..5).map(|_| middle.map(|c| c + dice.between(-size, size))).collect();
+            for axis in 0..3 {
+                let of = points.iter().map(|point| point[axis]);
+                batch.boxes[axis][lane] = of.clone().fold(f32::INFINITY, f32::min);
+                batch.boxes[axis + 3][lane] = of.fold(f32::NEG_INFINITY, f32::max);
+            }
+            for (row, element) in batch.matrix.iter_mut().zip(m) {
+                row[lane] = element;
+            }
+            clips.push(points.iter().map(|&point| transform(&m, point)).collect());
+        }
+        (batch, clips)
+    }
+
+    #[test]
+    fn bounds_hold_all_vertices() {
+        let (window, projection) = (Window::new(VIEWPORT), Projection::new(VIEWPORT));
+        let mut dice = Dice(1);
+        let (mut narrow, mut outside) = (0, 0);
+        for i in 0..40_000 {
+            let far = [0.0, 1.0, 100.0, 1e4, 1e6][i % 5];
+            let (batch, clips) = round(&mut dice, far);
+            let places = dispatch!(Level::new(), s => projection.clusters(s, &batch));
+            for (place, clips) in places.iter().zip(clips) {
+                match *place {
+                    Place::Wide => {}
+                    Place::Outside => {
+                        outside += 1;
+                        let beyond = clips.iter().fold(0x3f, |all, &clip| {
+                            let [x, y, z, w] = clip;
+                            let out = [z, w - z, w + x, w - x, w + y, w - y].map(|d| d < 0.0);
+                            all & out
+                                .iter()
+                                .enumerate()
+                                .map(|(i, &out)| u32::from(out) << i)
+                                .sum::<u32>()
+                        });
+                        let aside = clips.iter().all(|&clip| window.clipper.outside(clip) == 0);
+                        assert!(beyond != 0 || aside, "{far}: {clips:?} is not outside");
+                    }
+                    Place::Narrow { min, max, near } => {
+                        narrow += 1;
+                        for clip in clips {
+                            assert_eq!(
+                                window.clipper.outside(clip),
+                                0,
+                                "{far}: {clip:?} is clipped"
+                            );
+                            let vertex = window.vertex(clip);
+                            for (axis, at) in [vertex.x, vertex.y].into_iter().enumerate() {
+                                let (low, high) = (i32::from(min[axis]), i32::from(max[axis]));
+                                assert!((low * 256..(high + 1) * 256).contains(&at), "{far}: {at}");
+                            }
+                            assert!(near <= vertex.z.to_bits(), "{far}: nearer than {near:x}");
+                        }
+                    }
+                }
+            }
+        }
+        assert!(narrow > 100_000 && outside > 1000, "{narrow} {outside} prove little");
+    }
+}
