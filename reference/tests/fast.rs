@@ -229,6 +229,18 @@ fn a_crowded_picture_is_equal_in_every_way() {
     }
 }
 
+/// As large as pictures get here: a thousand regions.
+#[test]
+fn a_large_picture_is_equal_at_every_level() {
+    let (positions, triangles) = patch(24, &[0.0, 0.3, 0.7, 0.1]);
+    let matrices =
+        vec![perspective(3.0, [0.3, 0.2, -6.0], 0.2), perspective(9.0, [1.0, 0.0, -20.0], 0.5)];
+    let viewport = Viewport { width: 4096, height: 4095 };
+    let model = Model { positions, triangles, matrices };
+    let ways = SimdLevel::available().into_iter().map(|level| (level, true, 2));
+    compare(viewport, &[model], Faces::Both, ways).unwrap();
+}
+
 /// Edges from near to very far away: coordinates stay in range, and both renderers agree.
 #[test]
 fn edges_too_uneven_for_f32_stay_in_range() {

@@ -24,9 +24,9 @@ use crate::scene::{Scene, generate};
 const REPEATED_FRAMES: u32 = 1;
 /// The scenes of the default run.
 const DEFAULT_SCENES: [&str; 4] = ["bunnies", "city", "rooms", "soup"];
-/// Frames of the default run: 24 at full size take over three minutes on two cores, and the default
+/// Frames of the default run: 24 at full size take over two minutes on two cores, and the default
 /// is to answer within one. Naming a scene or `--frames` lifts the cut.
-const DEFAULT_RUN_FRAMES: u32 = 4;
+const DEFAULT_RUN_FRAMES: u32 = 6;
 /// How many of the cullers the default run takes.
 const DEFAULT_CULLERS: usize = 3;
 

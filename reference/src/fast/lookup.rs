@@ -3,6 +3,7 @@
 
 use fearless_simd::Simd;
 
+#[cfg(target_arch = "x86_64")]
 use super::level::LANES;
 use super::mesh::CLUSTER_VERTICES;
 
@@ -15,6 +16,8 @@ pub(crate) fn corners<S: Simd, const SLOTS: usize>(
     places: &[u32],
     out: &mut [[u32; SLOTS]; 3],
 ) {
+    // Without shuffles of two registers it is a plain loop.
+    let _ = s;
     #[cfg(target_arch = "x86_64")]
     if let Some(avx512) = s.level().as_avx512() {
         let [a, b, c] = out;

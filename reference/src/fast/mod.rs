@@ -171,7 +171,9 @@ impl Add for Work {
     }
 }
 
-/// Draws the instances into what `image` holds, on as many threads as rayon has.
+/// Draws the instances into what `image` holds, on as many threads as rayon has. Takes 16 bytes for each
+/// cluster, 64 for each triangle of a cluster that is large on the screen or not wholly before the eye,
+/// and 8 for each region that some 5,000 triangles touch, until it returns.
 pub fn draw(image: &mut Image, instances: &[Instance<'_>], options: Options) -> Work {
     paint(image, instances, options, false)
 }
