@@ -5,7 +5,7 @@ use std::fmt;
 use super::{Conservative, CountsCheck, Determinism, DeviceImage, Excess, ImageCheck};
 use crate::cull::{Culler, CullerSetup, ProxyKind};
 use crate::index::INDEXES;
-use crate::oracle::{Oracle, Sim};
+use crate::oracle::{CostModel, Oracle, Sim};
 use crate::part::PartitionKnobs;
 use crate::run::{self, FrameRecord, FrameTrace, Lane, LaneInfo, Observer, RunError, Trace, World};
 use crate::scene::Scene;
@@ -135,6 +135,7 @@ pub fn judge(
             partition: world.partition.clone(),
             index: (INDEXES[0].build)(&entries),
             proxy: ProxyKind::Rectangle,
+            cost: CostModel::lavapipe(),
         })
     };
     let stage = world.stage();

@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use plainsight_reference::fast::{Options, SimdLevel};
 
 use crate::cull::ProxyKind;
-use crate::part::PartitionKnobs;
+use crate::part::{Crossing, PartitionKnobs};
 use crate::scene::Viewport;
 use crate::scene::generate::{CameraMode, Knobs};
 
@@ -32,6 +32,8 @@ pub(super) enum Verb {
     Replay(ReplayArgs),
     /// Draw a frame: the truth, the culled image and the view from above, as PNG.
     Picture(PictureArgs),
+    /// Set cullers beside Table 1 and Figures 6 to 9 of Kovalčík & Sochor 2006, on the same frames.
+    Compare(CompareArgs),
     /// List scenes, cullers, oracles, indexes and devices.
     List,
 }
@@ -61,6 +63,10 @@ pub(super) struct SceneArgs {
     /// Size of generated scenes: 1 is a million triangles and more.
     #[arg(long)]
     pub(super) scale: Option<f64>,
+    /// The size that the scene's source gives: powerplant 1,185 objects and 13 million triangles,
+    /// bunnies 300 meshes of 70,000.
+    #[arg(long, conflicts_with = "scale")]
+    pub(super) full_size: bool,
     /// Pixels, WIDTHxHEIGHT (default 1280x1024).
     #[arg(long, value_parser = viewport)]
     pub(super) viewport: Option<Viewport>,
@@ -74,12 +80,19 @@ pub(super) struct SceneArgs {
     #[arg(long, default_value_t = PartitionKnobs::default().leaf_triangles,
         value_parser = clap::value_parser!(u32).range(1..))]
     pub(super) leaf: u32,
+    /// What becomes of a triangle between two parts.
+    #[arg(long, value_enum, default_value_t = PartsArg::Split)]
+    pub(super) parts: PartsArg,
     /// Which spatial index over the objects.
     #[arg(long, default_value = "two-level-bsp")]
     pub(super) index: String,
     /// What is asked about in the place of geometry.
     #[arg(long, value_enum, default_value_t = ProxyArg::Rectangle)]
     pub(super) proxy: ProxyArg,
+    /// What work costs the device, for adaptive cullers and virtual time: lavapipe, or a calibration
+    /// file.
+    #[arg(long, value_name = "NAME|FILE.toml", default_value = "lavapipe")]
+    pub(super) cost: String,
     /// Vector instructions of the reference renderer (default: the widest of this machine). No
     /// result depends on it.
     #[arg(long, value_name = "LEVEL", value_parser = simd)]
@@ -101,7 +114,7 @@ pub(super) struct RunArgs {
     /// Cullers (default: full simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
-    /// Oracles: sim, hardware, always (default: sim, and hardware where a Vulkan device is found).
+    /// Oracles: sim, hardware, pyramid, always (default: sim, and hardware where a Vulkan device is found).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) oracle: Vec<String>,
     #[command(flatten)]
@@ -112,6 +125,29 @@ pub(super) struct RunArgs {
     /// Also write the JSON lines to this file.
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
+}
+
+#[derive(Args, Clone)]
+pub(super) struct CompareArgs {
+    /// Scenes by name, or scene files (default: powerplant bunnies).
+    #[arg(long, value_name = "NAME|FILE.toml", num_args = 1.., value_delimiter = ',')]
+    pub(super) scene: Vec<String>,
+    /// Cullers (default: full simple vfc).
+    #[arg(long, num_args = 1.., value_delimiter = ',')]
+    pub(super) culler: Vec<String>,
+    /// Oracles: sim, hardware, pyramid, always (default: sim, and hardware where a Vulkan device is found).
+    #[arg(long, num_args = 1.., value_delimiter = ',')]
+    pub(super) oracle: Vec<String>,
+    /// Leaf sizes to compare, most triangles in a part (default: --leaf; at full size those that the
+    /// paper's text and table lead to).
+    #[arg(long, num_args = 1.., value_delimiter = ',',
+        value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) leaves: Vec<u32>,
+    #[command(flatten)]
+    pub(super) scene_args: SceneArgs,
+    /// Folder for the figures (SVG and PNG) and the series (CSV).
+    #[arg(long, value_name = "FOLDER", default_value = "comparison")]
+    pub(super) out: PathBuf,
 }
 
 #[derive(Args, Clone)]
@@ -180,6 +216,14 @@ pub(super) enum CameraArg {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum PartsArg {
+    /// It is split: parts do not overlap, triangles become more.
+    Split,
+    /// It goes whole to one of them: no new triangles, parts overlap.
+    Whole,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum ProxyArg {
     /// The projected corners' rectangle at the nearest depth.
     Rectangle,
@@ -216,6 +260,15 @@ fn simd(text: &str) -> Result<SimdLevel, String> {
 }
 
 impl SceneArgs {
+    /// How meshes become parts.
+    pub(super) fn partition(&self) -> PartitionKnobs {
+        let crossing = match self.parts {
+            PartsArg::Split => Crossing::Split,
+            PartsArg::Whole => Crossing::Whole,
+        };
+        PartitionKnobs { leaf_triangles: self.leaf, crossing }
+    }
+
     /// How the reference renderer draws.
     pub(super) fn render(&self) -> Options {
         let default = Options::default();
@@ -233,6 +286,7 @@ impl SceneArgs {
             frames: self.frames,
             viewport: self.viewport,
             mesh: self.mesh.clone(),
+            full_size: self.full_size,
             camera: self.camera.map(|camera| match camera {
                 CameraArg::Inside => CameraMode::Inside,
                 CameraArg::Orbit => CameraMode::Orbit,
@@ -242,7 +296,7 @@ impl SceneArgs {
 
     /// The flags that lead here again, each preceded by a space; defaults are left out.
     pub(super) fn replay_flags(&self) -> String {
-        let mut flags = String::new();
+        let mut flags = String::from(if self.full_size { " --full-size" } else { "" });
         let mut add = |name: &str, value: Option<String>| {
             if let Some(value) = value {
                 flags += &format!(" --{name} {}", quoted(&value));
@@ -255,8 +309,10 @@ impl SceneArgs {
         add("camera", self.camera.map(|c| camera(c).to_owned()));
         let leaf = (self.leaf != PartitionKnobs::default().leaf_triangles).then_some(self.leaf);
         add("leaf", leaf.map(|leaf| leaf.to_string()));
+        add("parts", (self.parts == PartsArg::Whole).then(|| "whole".to_owned()));
         add("index", (self.index != "two-level-bsp").then(|| self.index.clone()));
         add("proxy", (self.proxy == ProxyArg::Box).then(|| "box".to_owned()));
+        add("cost", (self.cost != "lavapipe").then(|| self.cost.clone()));
         add("adapter", self.adapter.clone());
         flags
     }

@@ -18,6 +18,10 @@ pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<
     let oracles = [
         ("sim", "the reference z-buffer, exact and at once"),
         ("hardware", "occlusion queries of a Vulkan device through wgpu"),
+        (
+            "pyramid",
+            "the same device and answers, by maxima of its depth in place of query objects",
+        ),
         ("always", "everything is visible"),
     ];
     section("oracles", oracles.iter().map(|&(name, summary)| pair(name, summary)).collect())?;

@@ -3,6 +3,7 @@
 //! `talk`.
 
 mod args;
+mod compare;
 mod list;
 mod picture;
 mod run;
@@ -91,6 +92,7 @@ pub fn main(
         args::Verb::Run(args) => run::run(&args, cullers, &mut streams),
         args::Verb::Replay(args) => run::replay(&args, cullers, &mut streams),
         args::Verb::Picture(args) => picture::picture(&args, cullers, &mut streams),
+        args::Verb::Compare(args) => compare::compare(&args, cullers, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),
     };
     done.unwrap_or_else(|error| {

@@ -11,9 +11,9 @@ use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
 use crate::check::Gate;
 use crate::cull::{Culler, CullerKind, CullerSetup};
 use crate::index::{Entry, INDEXES, IndexKind};
-use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
-use crate::oracle::{Always, Oracle, OracleError, Sim, Stage};
-use crate::part::{PartId, PartitionKnobs};
+use crate::oracle::wgpu::{Gpu, GpuStage, Hardware, Questions};
+use crate::oracle::{Always, CostModel, Oracle, OracleError, Sim, Stage};
+use crate::part::PartId;
 use crate::report::{Row, table};
 use crate::run::{
     FrameRecord, Lane, LaneInfo, Observer, Trace, World, partition_difference, run as run_lanes,
@@ -41,10 +41,12 @@ pub(super) struct Oracles {
 
 impl Oracles {
     /// Whether every name is one of an oracle.
-    fn known(names: &[String]) -> Result<(), CliError> {
-        let known = |name: &&String| ["sim", "hardware", "always"].contains(&name.as_str());
+    pub(super) fn known(names: &[String]) -> Result<(), CliError> {
+        let known =
+            |name: &&String| ["sim", "hardware", "pyramid", "always"].contains(&name.as_str());
         names.iter().find(|name| !known(name)).map_or(Ok(()), |name| {
-            let what = format!("no oracle is called '{name}'; there are sim, hardware, always");
+            let what =
+                format!("no oracle is called '{name}'; there are sim, hardware, pyramid, always");
             Err(CliError::Usage(what))
         })
     }
@@ -55,7 +57,7 @@ impl Oracles {
         adapter: Option<&str>,
         streams: &mut Streams<'_>,
     ) -> Result<Self, CliError> {
-        let wanted = names.is_empty() || names.iter().any(|name| name == "hardware");
+        let wanted = names.is_empty() || names.iter().any(|name| on_device(name));
         let found =
             if wanted { Gpu::open(adapter) } else { Err(OracleError::NoDevice(String::new())) };
         let asked_for = !names.is_empty() || adapter.is_some();
@@ -75,7 +77,7 @@ impl Oracles {
                         "WARNING: no hardware queries are judged; the simulated device runs alone"
                     )?;
                 }
-                names.retain(|name| name != "hardware");
+                names.retain(|name| !on_device(name));
                 Ok(Self { names, gpu: None })
             }
         }
@@ -91,6 +93,11 @@ impl Oracles {
     }
 }
 
+/// Whether the oracle of that name asks a real device.
+fn on_device(name: &str) -> bool {
+    ["hardware", "pyramid"].contains(&name)
+}
+
 struct StagedOracles<'a> {
     names: &'a [String],
     stage: Stage,
@@ -104,7 +111,9 @@ impl StagedOracles<'_> {
             "always" => Ok(Box::<Always>::default()),
             _ => {
                 let stage = self.gpu.as_ref().expect("hardware is named only where it was opened");
-                Ok(Box::new(Hardware::new(stage)?))
+                let pyramid = name == "pyramid";
+                let questions = if pyramid { Questions::Pyramid } else { Questions::Queries };
+                Ok(Box::new(Hardware::new(stage, questions)?))
             }
         }
     }
@@ -150,7 +159,7 @@ impl Named {
 
     /// The scene cut into parts.
     pub(super) fn world(&self, args: &SceneArgs) -> World {
-        let knobs = PartitionKnobs { leaf_triangles: args.leaf };
+        let knobs = args.partition();
         World::new(self.scene.clone(), knobs).rendered(args.render())
     }
 }
@@ -176,15 +185,32 @@ pub(super) struct Plan<'a> {
     pub(super) cullers: Vec<CullerKind>,
     pub(super) index: IndexKind,
     pub(super) oracles: Oracles,
+    pub(super) cost: CostModel,
     pub(super) args: &'a SceneArgs,
+}
+
+/// The cost model of that name or file.
+pub(super) fn pick_cost(args: &SceneArgs) -> Result<CostModel, CliError> {
+    CostModel::open(&args.cost).map_err(CliError::Usage)
 }
 
 impl Plan<'_> {
     /// Runs every lane of one scene.
     pub(super) fn run(&self, named: &Named, bar: &ProgressBar) -> Result<Finished, CliError> {
+        self.run_after(named, bar, &mut |_| {})
+    }
+
+    /// The same; `built` sees the world before anything is run on it.
+    pub(super) fn run_after(
+        &self,
+        named: &Named,
+        bar: &ProgressBar,
+        built: &mut dyn FnMut(&World),
+    ) -> Result<Finished, CliError> {
         let name = &named.name;
         bar.set_message(format!("{name}: building"));
         let world = named.world(self.args);
+        built(&world);
         let frames = world.scene.frames;
         let stage = world.stage();
         let staged = self.oracles.stage(&stage)?;
@@ -259,6 +285,7 @@ impl Plan<'_> {
                 partition: world.partition.clone(),
                 index: (self.index.build)(entries),
                 proxy: self.args.proxy.into(),
+                cost: self.cost.clone(),
             })
         })
     }
@@ -313,9 +340,11 @@ pub(super) fn run(
     Oracles::known(&args.oracle)?;
     let scenes = names.iter().map(open).collect::<Result<Vec<Named>, CliError>>()?;
     let adapter = args.scene_args.adapter.as_deref();
+    let cost = pick_cost(&scene_args)?;
     let plan = Plan {
         cullers: chosen,
         index,
+        cost,
         oracles: Oracles::open(&args.oracle, adapter, streams)?,
         args: &scene_args,
     };
@@ -392,7 +421,11 @@ fn tell_table(rows: &[Row], cut: bool, streams: &mut Streams<'_>) -> Result<(), 
 }
 
 /// What failed, and the line that replays it.
-fn tell_failures(gate: &Gate, trace: &Trace, streams: &mut Streams<'_>) -> std::io::Result<()> {
+pub(super) fn tell_failures(
+    gate: &Gate,
+    trace: &Trace,
+    streams: &mut Streams<'_>,
+) -> std::io::Result<()> {
     if !gate.held() {
         let lane = &trace.lane;
         writeln!(streams.talk, "FAILED: {} on {}", lane.culler, lane.oracle)?;
@@ -415,7 +448,7 @@ pub(super) fn one_lane<'a>(
     Oracles::known(oracle)?;
     let named = Named::open(scene, args)?;
     let oracles = Oracles::open(oracle, args.adapter.as_deref(), streams)?;
-    Ok((Plan { cullers: chosen, index, oracles, args }, named))
+    Ok((Plan { cullers: chosen, index, oracles, cost: pick_cost(args)?, args }, named))
 }
 
 pub(super) fn replay(

@@ -1,43 +1,56 @@
-//! `full`, the algorithm of Kovalčík & Sochor 2006 (section 3, Algorithms 1 to 4).
+//! `full`, the method of Kovalčík & Sochor 2006 (section 3), arranged so that a frame needs few round
+//! trips. `full-waits` keeps the paper's waiting rule to the letter.
 //!
-//! 1. A list of *active nodes* of both levels, kept in front-to-back order: a visible node is replaced
-//!    in place by its nearer child, its objects with trees, its farther child (Algorithm 4).
-//! 2. Each pass over the list takes the answers of the pass before, then gives every node the
-//!    `FirstVisibilityTest` (Algorithm 3): outside the frustum, certainly visible, invisible last time
-//!    (ask), visible so often of late that the question is postponed, or ask.
-//! 3. Questions of one pass are asked in parallel if their screen rectangles overlap neither one
-//!    another nor a nearer node that still waits; the others stay in the list for the next pass.
-//!    (The paper compares with issued queries only. Waiting behind a nearer *waiting* node as well
-//!    keeps the farther one from being answered against a buffer that lacks the nearer.)
-//! 4. At most [`FullKnobs::most_in_flight`] questions a pass.
+//! 1. The walk (Algorithms 2 and 4): front to back through both levels. A node takes the
+//!    `FirstVisibilityTest` (Algorithm 3): outside the frustum; certainly visible; visible last time,
+//!    so drawn at once; invisible last time, so a *candidate*.
+//! 2. One batch: everything drawn so far, then questions about all candidates, nearest first, then
+//!    about those drawn nodes whose next question is due by the postponement curve (Figure 3). A due
+//!    node was drawn and nobody waits: its answer counts from the next frame on.
+//! 3. Candidates that show are walked in turn, and make the next batch; at most
+//!    [`FullKnobs::most_in_flight`] questions a batch.
+//! 4. An inner node was visible if anything below it was (Bittner et al. 2004, *pull-up*), so visible
+//!    inner nodes need no question; the paper asks about them too.
+//! 5. Candidates that have long been hidden are asked about together (`group`).
+//! 6. Tightened boxes (section 3.4) where contents stand still; lazy reconstruction is the index's.
+//! 7. Adaptive, with a cost model (the paper's conclusion): a question is asked only where what it may
+//!    save exceeds what it costs, a batch only where its questions together are worth a round trip.
 //!
-//! Departures: Figure 3's curve is not given in numbers; see [`POSTPONEMENT`]. A node not seen in the
-//! frame before counts as invisible then, so history never outlives a gap. Cost: passes × active
-//! nodes; a pass is one round trip to the device. It loses against `vfc` where little is hidden.
+//! Departures: the paper's rule that questions with overlapping rectangles wait for one another is not
+//! kept: what was visible last time is drawn before anything is asked, so the buffer is nearly whole,
+//! and a wrong "visible" costs less than a round trip. Objects without a tree are nodes of their own.
+//! It loses against `vfc` where little is hidden, unless adaptive.
 
+use super::opened::{NO_PARENT, OpenedNodes};
 use super::scenery::Appearance;
-use super::{Culler, CullerSetup, Item, Pen, Scenery, View};
+use super::{Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, View, group};
 use crate::index::NodeId;
-use crate::math::PixelRectangle;
-use crate::oracle::{OracleError, QueryId};
-
-/// Frames to wait before the next question, by the number of "visible" answers in a row (section 3.4:
-/// the higher the number, the longer the wait). Beyond the end, the last entry.
-const POSTPONEMENT: [u32; 6] = [0, 1, 2, 4, 6, 8];
+use crate::oracle::{CostModel, OracleError, Proxy};
 
 /// What can be tuned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct FullKnobs {
-    /// Most questions in one pass, at least 1.
-    pub most_in_flight: u32,
-    /// Whether recent answers may postpone questions.
-    pub postpone: bool,
+    /// Most questions in one batch, at least 1.
+    pub most_in_flight: usize,
+    /// How recent answers postpone questions.
+    pub postponement: Postponement,
+    /// Most nodes in one question; 1 asks about each alone.
+    pub most_together: usize,
+    /// Whether to take tightened boxes.
+    pub tighten: bool,
+    /// Ask only where it pays by this model.
+    pub adaptive: Option<CostModel>,
 }
 
 impl Default for FullKnobs {
     fn default() -> Self {
-        // lavapipe counts right up to 640 queries a pass and is slow to begin one; see the device.
-        Self { most_in_flight: 128, postpone: true }
+        Self {
+            most_in_flight: 1024,
+            postponement: Postponement::default(),
+            most_together: 16,
+            tighten: true,
+            adaptive: None,
+        }
     }
 }
 
@@ -46,171 +59,312 @@ impl Default for FullKnobs {
 struct History {
     /// One more than the last frame in which the node was visible; 0 for never.
     visible_after: u32,
+    /// One more than the last frame in which the node was found hidden; 0 for never.
+    hidden_after: u32,
+    /// Frames in a row in which it was found hidden.
+    hidden_frames: u32,
     /// "Visible" answers in a row.
     streak: u8,
     /// The first frame in which to ask again.
     ask_from: u32,
 }
 
-/// Where an active node stands.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum State {
-    /// Not yet looked at.
-    New,
-    /// Looked at, may not be asked yet.
-    Waiting(PixelRectangle, crate::oracle::Proxy),
-    /// Asked.
-    Asked(QueryId),
+/// A node that was invisible last time, to be asked about.
+struct Candidate {
+    item: Item,
+    proxy: Proxy,
+    /// The place in `opened` of the node it was reached from.
+    parent: usize,
+    /// Whether it failed in a group and is to be asked about alone.
+    alone: bool,
+}
+
+/// A drawn part whose next question is due.
+struct Due {
+    item: Item,
+    proxy: Proxy,
+    /// Its own place in `opened`.
+    place: usize,
+}
+
+/// What one frame has at hand.
+#[derive(Default)]
+struct Frame {
+    opened: OpenedNodes,
+    candidates: Vec<Candidate>,
+    due: Vec<Due>,
+    next: Vec<Item>,
+    stack: Vec<(Item, usize)>,
 }
 
 /// The paper's culler.
 pub struct Full {
+    name: &'static str,
     scenery: Scenery,
     knobs: FullKnobs,
     history: Vec<History>,
-}
-
-/// Algorithm 3's three outcomes.
-enum First {
-    Invisible,
-    Visible,
-    NeedQuery(PixelRectangle, crate::oracle::Proxy),
+    frame: Frame,
 }
 
 impl Full {
-    /// Over the index and partition of `setup`.
+    /// Over the index and partition of `setup`, under `name` in reports.
     ///
     /// # Panics
-    /// If no question may be in flight.
+    /// If no question may be in flight, or none may stand in one.
     #[must_use]
-    pub fn new(setup: CullerSetup, knobs: FullKnobs) -> Self {
+    pub fn new(name: &'static str, setup: CullerSetup, knobs: FullKnobs) -> Self {
         assert!(knobs.most_in_flight > 0, "at least one question must be in flight");
-        let scenery = Scenery::new(setup);
-        let history = vec![History::default(); scenery.slot_count() as usize];
-        Self { scenery, knobs, history }
+        assert!(knobs.most_together > 0, "a question is about at least one node");
+        let scenery_knobs = SceneryKnobs { tighten: knobs.tighten, treeless_items: true };
+        let scenery = Scenery::new(setup, scenery_knobs);
+        Self { name, scenery, knobs, history: Vec::new(), frame: Frame::default() }
     }
 
-    /// Algorithm 3.
-    fn first_visibility_test(&mut self, view: &View<'_>, item: Item) -> First {
-        match self.scenery.appearance(view, item) {
-            Appearance::Nowhere => First::Invisible,
-            Appearance::Certain => {
-                // Nothing was measured, so no streak grows from it.
-                self.history[self.scenery.slot(item)].visible_after = view.frame + 1;
-                First::Visible
-            }
-            Appearance::Ask(rectangle, proxy) => {
-                let history = &mut self.history[self.scenery.slot(item)];
-                let visible_last_time = view.frame > 0 && history.visible_after == view.frame;
-                if !visible_last_time {
-                    history.streak = 0;
-                    return First::NeedQuery(rectangle, proxy);
+    /// Walks down from what is on the stack; draws what counts as visible, gathers the rest.
+    fn walk(&mut self, view: &View<'_>, pen: &mut Pen<'_>) {
+        while let Some((item, parent)) = self.frame.stack.pop() {
+            let proxy = match self.scenery.appearance(view, item) {
+                Appearance::Nowhere => continue,
+                Appearance::Certain => {
+                    self.open(view, pen, item, parent, true);
+                    continue;
                 }
-                if self.knobs.postpone && view.frame < history.ask_from {
-                    history.visible_after = view.frame + 1;
-                    return First::Visible;
+                Appearance::Ask(_, proxy) => proxy,
+            };
+            let history = self.history[self.scenery.slot(item)];
+            let visible_last_time = view.frame > 0 && history.visible_after == view.frame;
+            if !visible_last_time {
+                if self.pays(self.chance_hidden(view, item), item) {
+                    self.frame.candidates.push(Candidate { item, proxy, parent, alone: false });
+                } else {
+                    self.open(view, pen, item, parent, true);
                 }
-                First::NeedQuery(rectangle, proxy)
+            } else if self.scenery.is_part(item) && view.frame >= history.ask_from {
+                // The longer it has been visible the less likely is it hidden now; what is saved is
+                // saved in all the frames until the next question.
+                let wait = f64::from(self.knobs.postponement.wait(history.streak) + 1);
+                let chance = wait / (f64::from(history.streak) + 2.0);
+                let pays = self.pays(chance, item);
+                let place = self.open(view, pen, item, parent, !pays);
+                if pays {
+                    self.frame.due.push(Due { item, proxy, place });
+                }
+            } else {
+                self.open(view, pen, item, parent, true);
             }
         }
     }
 
-    fn remember(&mut self, view: &View<'_>, item: Item, visible: bool) {
-        let history = &mut self.history[self.scenery.slot(item)];
-        if visible {
-            let wait = POSTPONEMENT[usize::from(history.streak).min(POSTPONEMENT.len() - 1)];
-            history.visible_after = view.frame + 1;
-            history.ask_from = view.frame + 1 + wait;
-            history.streak = history.streak.saturating_add(1);
-        } else {
-            *history = History::default();
-        }
+    /// Whether a question about a node that is hidden with this chance is worth asking.
+    fn pays(&self, chance: f64, item: Item) -> bool {
+        self.knobs
+            .adaptive
+            .as_ref()
+            .is_none_or(|model| self.saving(model, chance, item) > model.query_ns + model.proxy_ns)
     }
 
-    /// One pass over the active nodes: settles what was answered, looks at what is new, asks what may
-    /// be asked. Returns the list for the next pass and whether anything was asked.
-    fn pass(
+    /// What a question about such a node may be expected to save.
+    fn saving(&self, model: &CostModel, chance: f64, item: Item) -> f64 {
+        let weight = self.scenery.weight(item);
+        chance * model.drawing_ns(weight.parts, weight.triangles)
+    }
+
+    /// Whether what waits to be asked is together worth a round trip; if not, all of it is opened.
+    fn worth_a_trip(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> bool {
+        let Some(model) = &self.knobs.adaptive else { return true };
+        let saved: f64 = self
+            .frame
+            .candidates
+            .iter()
+            .map(|c| {
+                let saving = self.saving(model, self.chance_hidden(view, c.item), c.item);
+                saving - model.query_ns - model.proxy_ns
+            })
+            .sum();
+        // Due questions go along where something is asked, and are a good reason of their own once
+        // they are many.
+        let due: f64 = self.frame.due.iter().map(|d| self.saving(model, 0.5, d.item)).sum();
+        if saved + due > model.trip_ns {
+            return true;
+        }
+        for part in std::mem::take(&mut self.frame.due) {
+            self.frame.opened.show(part.place);
+        }
+        for candidate in std::mem::take(&mut self.frame.candidates) {
+            self.open(view, pen, candidate.item, candidate.parent, true);
+        }
+        self.walk(view, pen);
+        false
+    }
+
+    /// Draws the node's own part or puts its children on the stack. `shows`: whether a part counts as
+    /// visible without a further word.
+    fn open(
         &mut self,
         view: &View<'_>,
         pen: &mut Pen<'_>,
-        active: Vec<(Item, State)>,
-        visible: &dyn Fn(QueryId) -> bool,
-    ) -> (Vec<(Item, State)>, bool) {
-        let mut stack = active;
-        stack.reverse();
-        let (mut kept, mut next) = (Vec::new(), Vec::new());
-        let mut taken: Vec<PixelRectangle> = Vec::new();
-        let mut asked = 0;
-        while let Some((item, state)) = stack.pop() {
-            let (rectangle, proxy) = match state {
-                State::Asked(query) => {
-                    let visible = visible(query);
-                    self.remember(view, item, visible);
-                    if visible {
-                        self.expand(view, pen, item, &mut next, &mut stack);
-                    }
-                    continue;
-                }
-                State::Waiting(rectangle, proxy) => (rectangle, proxy),
-                State::New => match self.first_visibility_test(view, item) {
-                    First::Invisible => continue,
-                    First::Visible => {
-                        self.expand(view, pen, item, &mut next, &mut stack);
-                        continue;
-                    }
-                    First::NeedQuery(rectangle, proxy) => (rectangle, proxy),
-                },
-            };
-            let free = asked < self.knobs.most_in_flight
-                && !taken.iter().any(|other| other.overlaps(&rectangle));
-            taken.push(rectangle);
-            kept.push((
-                item,
-                if free {
-                    asked += 1;
-                    State::Asked(pen.ask(&proxy))
-                } else {
-                    State::Waiting(rectangle, proxy)
-                },
-            ));
+        item: Item,
+        parent: usize,
+        shows: bool,
+    ) -> usize {
+        let place = self.frame.opened.push(item, parent);
+        self.scenery.expand(view, item, pen, &mut self.frame.next);
+        let below = self.frame.next.drain(..).rev().map(|item| (item, place));
+        self.frame.stack.extend(below);
+        if shows && self.scenery.is_part(item) {
+            self.frame.opened.show(place);
         }
-        (kept, asked > 0)
+        place
     }
 
-    fn expand(
-        &self,
-        view: &View<'_>,
-        pen: &mut Pen<'_>,
-        item: Item,
-        next: &mut Vec<Item>,
-        stack: &mut Vec<(Item, State)>,
-    ) {
-        self.scenery.expand(view, item, pen, next);
-        stack.extend(next.drain(..).rev().map(|item| (item, State::New)));
+    /// "Visible" from the device.
+    fn seen(&mut self, view: &View<'_>, item: Item) {
+        let slot = self.scenery.slot(item);
+        let history = &mut self.history[slot];
+        let wait = self.knobs.postponement.wait(history.streak);
+        // Nodes that came into view together are not all asked about in one frame again.
+        let spread = if wait > 1 { (slot as u32).wrapping_mul(SPREAD) % (wait / 2 + 1) } else { 0 };
+        history.visible_after = view.frame + 1;
+        history.ask_from = view.frame + 1 + wait - spread;
+        history.streak = history.streak.saturating_add(1);
+        history.hidden_frames = 0;
+    }
+
+    /// "Hidden" from the device.
+    fn hidden(&mut self, view: &View<'_>, item: Item) {
+        let slot = self.scenery.slot(item);
+        let history = &mut self.history[slot];
+        let again = view.frame > 0 && history.hidden_after == view.frame;
+        *history = History {
+            hidden_after: view.frame + 1,
+            hidden_frames: if again { history.hidden_frames + 1 } else { 1 },
+            ..History::default()
+        };
+    }
+
+    /// The chance that a candidate is hidden, from how long it was.
+    fn chance_hidden(&self, view: &View<'_>, item: Item) -> f64 {
+        let history = &self.history[self.scenery.slot(item)];
+        let lately = view.frame > 0 && history.hidden_after == view.frame;
+        group::chance_of_staying_hidden(if lately { history.hidden_frames } else { 0 })
+    }
+
+    /// One batch of questions about candidates and due nodes; what shows is walked.
+    fn batch(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
+        let mut candidates = std::mem::take(&mut self.frame.candidates);
+        let chance: Vec<f64> = candidates
+            .iter()
+            .map(|c| if c.alone { 0.0 } else { self.chance_hidden(view, c.item) })
+            .collect();
+        // The surest first, so that they go together; among equals the nearer first.
+        let mut order: Vec<usize> = (0..candidates.len()).collect();
+        order.sort_by(|&a, &b| chance[b].total_cmp(&chance[a]));
+        let chances: Vec<f64> = order.iter().map(|&place| chance[place]).collect();
+        let mut ends = group::runs(&chances, self.knobs.most_together);
+        ends.truncate(self.knobs.most_in_flight);
+        let asked = ends.last().copied().unwrap_or(0);
+        let mut start = 0;
+        for &end in &ends {
+            let proxies: Vec<Proxy> =
+                order[start..end].iter().map(|&place| candidates[place].proxy).collect();
+            pen.ask_any(&proxies);
+            start = end;
+        }
+        let room = self.knobs.most_in_flight - ends.len();
+        let later = self.frame.due.split_off(room.min(self.frame.due.len()));
+        let due = std::mem::replace(&mut self.frame.due, later);
+        for part in &due {
+            pen.ask(&part.proxy);
+        }
+        let mut answers = Vec::new();
+        pen.round_trip(&mut answers)?;
+        let mut shows = vec![Fate::Unasked; candidates.len()];
+        let mut start = 0;
+        for (&end, answer) in ends.iter().zip(&answers) {
+            for &place in &order[start..end] {
+                shows[place] = match (answer.visible, end - start) {
+                    (false, _) => Fate::Hidden,
+                    (true, 1) => Fate::Shows,
+                    (true, _) => Fate::Again,
+                };
+            }
+            start = end;
+        }
+        debug_assert_eq!(start, asked);
+        for (part, answer) in due.iter().zip(&answers[ends.len()..]) {
+            if answer.visible {
+                self.seen(view, part.item);
+                self.frame.opened.show(part.place);
+            } else {
+                self.hidden(view, part.item);
+            }
+        }
+        for (candidate, fate) in candidates.drain(..).zip(shows) {
+            match fate {
+                Fate::Unasked => self.frame.candidates.push(candidate),
+                Fate::Again => self.frame.candidates.push(Candidate { alone: true, ..candidate }),
+                Fate::Hidden => self.hidden(view, candidate.item),
+                Fate::Shows => {
+                    self.seen(view, candidate.item);
+                    self.open(view, pen, candidate.item, candidate.parent, true);
+                    self.walk(view, pen);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Pulls visibility up: what was opened and shows nothing counts as hidden from the next frame on.
+    fn pull_up(&mut self, view: &View<'_>) {
+        for opened in self.frame.opened.iter() {
+            let slot = self.scenery.slot(opened.item);
+            let history = &mut self.history[slot];
+            if opened.shows {
+                history.visible_after = view.frame + 1;
+            } else if self.scenery.is_part(opened.item) {
+                // A due part with the answer "hidden".
+            } else if view.frame + 1 < history.ask_from {
+                // Its own box shows and nothing in it does: it stays open for a while, so that it is
+                // not asked about in vain in every other frame.
+                history.visible_after = view.frame + 1;
+            } else {
+                history.hidden_after = view.frame + 1;
+                history.hidden_frames = 1;
+            }
+        }
     }
 }
 
+/// What became of a candidate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fate {
+    /// There was no room for it.
+    Unasked,
+    Hidden,
+    Shows,
+    /// Something in its group shows.
+    Again,
+}
+
+/// An odd factor that scatters neighbouring slots (Knuth's multiplicative hashing).
+const SPREAD: u32 = 2_654_435_769;
+
 impl Culler for Full {
     fn name(&self) -> &str {
-        "full"
+        self.name
     }
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
-        self.scenery.begin_frame(view);
-        let mut active = vec![(Item::Scene(NodeId(0)), State::New)];
-        let mut answers = Vec::new();
-        while !active.is_empty() {
-            // Answers come in asking order, so a query's number finds its place.
-            let first = answers.first().map_or(0, |a: &crate::oracle::Answer| a.query.0);
-            let visible = |query: QueryId| answers[(query.0 - first) as usize].visible;
-            let (kept, asked) = self.pass(view, pen, active, &visible);
-            assert!(asked || kept.is_empty(), "the nearest waiting node can always be asked");
-            active = kept;
-            answers.clear();
-            if asked {
-                pen.round_trip(&mut answers)?;
+        self.scenery.begin_frame(view, &mut self.history);
+        self.frame = Frame::default();
+        self.frame.stack.push((Item::Scene(NodeId(0)), NO_PARENT));
+        self.walk(view, pen);
+        while !(self.frame.candidates.is_empty() && self.frame.due.is_empty()) {
+            if self.worth_a_trip(view, pen) {
+                self.batch(view, pen)?;
             }
         }
+        self.pull_up(view);
         Ok(())
     }
 

@@ -2,9 +2,15 @@
 //! oracle through the [`Pen`], and draws the parts it takes for visible. One frame loop per file
 //! behind [`Culler`]; `draw_all` is the stupid one. A culler must not know the truth.
 
+mod chc;
+mod chc_plus;
 mod draw_all;
 mod full;
+mod full_waits;
+pub mod group;
+mod opened;
 mod pen;
+mod postponement;
 mod scenery;
 mod simple;
 mod view;
@@ -13,13 +19,17 @@ mod view_frustum;
 use std::sync::Arc;
 
 use crate::index::Index;
-use crate::oracle::OracleError;
+use crate::oracle::{CostModel, OracleError};
 use crate::part::Partition;
 
+pub use chc::Chc;
+pub use chc_plus::ChcPlus;
 pub use draw_all::DrawAll;
 pub use full::{Full, FullKnobs};
+pub use full_waits::{FullWaits, FullWaitsKnobs};
 pub use pen::{Counts, Pen};
-pub use scenery::{Item, Scenery};
+pub use postponement::Postponement;
+pub use scenery::{Item, Scenery, SceneryKnobs, Weight};
 pub use simple::Simple;
 pub use view::{ObjectView, View};
 pub use view_frustum::ViewFrustum;
@@ -63,6 +73,8 @@ pub struct CullerSetup {
     pub index: Box<dyn Index>,
     /// What to ask about.
     pub proxy: ProxyKind,
+    /// What work costs the device, for cullers that weigh it.
+    pub cost: CostModel,
 }
 
 /// A member of the family.
@@ -84,7 +96,7 @@ pub const CULLERS: &[CullerKind] = &[
         name: "full",
         summary: "Kovalčík & Sochor 2006: parallel queries, recent results postpone the next query",
         asks: true,
-        make: |setup| Box::new(Full::new(setup, FullKnobs::default())),
+        make: |setup| Box::new(Full::new("full", setup, FullKnobs::default())),
     },
     CullerKind {
         name: "simple",
@@ -97,6 +109,34 @@ pub const CULLERS: &[CullerKind] = &[
         summary: "view-frustum culling over the same trees, no queries",
         asks: false,
         make: |setup| Box::new(ViewFrustum::new(setup)),
+    },
+    CullerKind {
+        name: "full-adaptive",
+        summary: "full, asking only where a cost model says that it pays",
+        asks: true,
+        make: |setup| {
+            let adaptive = Some(setup.cost.clone());
+            let knobs = FullKnobs { adaptive, ..FullKnobs::default() };
+            Box::new(Full::new("full-adaptive", setup, knobs))
+        },
+    },
+    CullerKind {
+        name: "full-waits",
+        summary: "the same to the letter: questions with overlapping rectangles wait for one another",
+        asks: true,
+        make: |setup| Box::new(FullWaits::new(setup, FullWaitsKnobs::default())),
+    },
+    CullerKind {
+        name: "chc",
+        summary: "coherent hierarchical culling, Bittner et al. 2004",
+        asks: true,
+        make: |setup| Box::new(Chc::new(setup)),
+    },
+    CullerKind {
+        name: "chc++",
+        summary: "CHC++, Mattausch et al. 2008: several nodes in a question, visible parts asked seldom",
+        asks: true,
+        make: |setup| Box::new(ChcPlus::new(setup)),
     },
     CullerKind {
         name: "draw-all",

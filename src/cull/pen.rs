@@ -2,13 +2,17 @@
 //! record that the trace is made of.
 
 use crate::oracle::{Answer, Oracle, OracleError, Proxy, QueryId};
-use crate::part::PartId;
+use crate::part::{PartId, Partition};
 
 /// What one frame cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Questions asked.
     pub queries: u64,
+    /// Proxies in all questions; more than questions where some were asked about together.
+    pub proxies: u64,
+    /// Triangles of the parts drawn.
+    pub triangles: u64,
     /// Answers that were "visible".
     pub visible_answers: u64,
     /// Times the culler waited for answers.
@@ -18,6 +22,7 @@ pub struct Counts {
 /// Draws, asks, and remembers.
 pub struct Pen<'a> {
     oracle: &'a mut dyn Oracle,
+    partition: &'a Partition,
     drawn: Vec<PartId>,
     already: Vec<bool>,
     counts: Counts,
@@ -25,12 +30,13 @@ pub struct Pen<'a> {
 }
 
 impl<'a> Pen<'a> {
-    /// A pen for one frame of `part_count` parts.
-    pub fn new(oracle: &'a mut dyn Oracle, part_count: u32) -> Self {
+    /// A pen for one frame of the parts of `partition`.
+    pub fn new(oracle: &'a mut dyn Oracle, partition: &'a Partition) -> Self {
         Self {
             oracle,
+            partition,
             drawn: Vec::new(),
-            already: vec![false; part_count as usize],
+            already: vec![false; partition.part_count() as usize],
             counts: Counts::default(),
             events_hash: 0xcbf2_9ce4_8422_2325,
         }
@@ -43,6 +49,7 @@ impl<'a> Pen<'a> {
     pub fn draw(&mut self, part: PartId) {
         if !std::mem::replace(&mut self.already[part.0 as usize], true) {
             self.note(1, u64::from(part.0));
+            self.counts.triangles += u64::from(self.partition.part(part).triangle_count);
             self.drawn.push(part);
             self.oracle.draw_part(part);
         }
@@ -50,13 +57,21 @@ impl<'a> Pen<'a> {
 
     /// Asks whether any sample of `proxy` would pass against what was drawn so far.
     pub fn ask(&mut self, proxy: &Proxy) -> QueryId {
+        self.ask_any(std::slice::from_ref(proxy))
+    }
+
+    /// One question about several proxies: whether any sample of any of them would pass.
+    pub fn ask_any(&mut self, proxies: &[Proxy]) -> QueryId {
         self.counts.queries += 1;
-        let query = self.oracle.ask(proxy);
+        self.counts.proxies += proxies.len() as u64;
+        let query = self.oracle.ask(proxies);
         self.note(2, u64::from(query.0));
-        if let Proxy::Rectangle { min, max, depth } = proxy {
-            self.note(3, u64::from(min[0]) << 32 | u64::from(min[1]));
-            self.note(3, u64::from(max[0]) << 32 | u64::from(max[1]));
-            self.note(3, u64::from(depth.to_bits()));
+        for proxy in proxies {
+            if let Proxy::Rectangle { min, max, depth } = proxy {
+                self.note(3, u64::from(min[0]) << 32 | u64::from(min[1]));
+                self.note(3, u64::from(max[0]) << 32 | u64::from(max[1]));
+                self.note(3, u64::from(depth.to_bits()));
+            }
         }
         query
     }

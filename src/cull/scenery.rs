@@ -19,16 +19,51 @@ pub enum Item {
     Object(ObjectId, u32),
 }
 
+/// Levels below a node whose boxes may stand for it (the paper's d_max).
+const TIGHTER_LEVELS: usize = 3;
+/// How much larger their surface may be together (the paper's s_max).
+const TIGHTER_SURFACE: f64 = 1.4;
+
+/// How a culler wants the two levels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SceneryKnobs {
+    /// Take the tight boxes of nodes whose contents stand still.
+    pub tighten: bool,
+    /// Objects without a tree are items of their own, to be asked about, instead of being drawn with
+    /// their node as in the paper.
+    pub treeless_items: bool,
+}
+
+/// What drawing everything at and below a node would take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Weight {
+    /// Parts.
+    pub parts: u64,
+    /// Their triangles.
+    pub triangles: u64,
+}
+
 /// The two levels, with the bounds that a frame needs.
 pub struct Scenery {
     index: Box<dyn Index>,
     partition: Arc<Partition>,
     proxy: ProxyKind,
-    /// First slot of each object's tree nodes in a flat history; scene nodes come before them.
+    knobs: SceneryKnobs,
+    /// First slot of each object's tree nodes in a flat history; an object without a tree has one.
     first_slot: Vec<u32>,
-    slot_count: u32,
+    /// Slots of all objects; those of scene nodes follow, whose number may grow.
+    object_slots: u32,
     /// Largest error of anything at or below each index node, renewed every frame.
     node_error: Vec<ClipError>,
+    /// The weight of each index node, renewed every frame.
+    node_weight: Vec<Weight>,
+}
+
+impl Weight {
+    fn add(&mut self, other: Self) {
+        self.parts += other.parts;
+        self.triangles += other.triangles;
+    }
 }
 
 /// How a box appears this frame.
@@ -45,53 +80,102 @@ pub(super) enum Appearance {
 impl Scenery {
     /// Takes the index and numbers every node of both levels.
     #[must_use]
-    pub fn new(setup: CullerSetup) -> Self {
-        let CullerSetup { partition, index, proxy } = setup;
-        let mut slot_count = index.node_count();
+    pub fn new(setup: CullerSetup, knobs: SceneryKnobs) -> Self {
+        let CullerSetup { partition, index, proxy, cost: _ } = setup;
+        let mut object_slots = 0;
         let mut first_slot = Vec::with_capacity(partition.object_count() as usize);
         for object in (0..partition.object_count()).map(ObjectId) {
-            first_slot.push(slot_count);
-            slot_count += partition.mesh(object).tree.as_ref().map_or(0, |t| t.nodes.len() as u32);
+            first_slot.push(object_slots);
+            object_slots +=
+                partition.mesh(object).tree.as_ref().map_or(1, |t| t.nodes.len() as u32);
         }
-        Self { index, partition, proxy, first_slot, slot_count, node_error: Vec::new() }
+        Self {
+            index,
+            partition,
+            proxy,
+            knobs,
+            first_slot,
+            object_slots,
+            node_error: Vec::new(),
+            node_weight: Vec::new(),
+        }
     }
 
-    /// How many nodes both levels have together.
+    /// How many nodes both levels have together; may grow from frame to frame.
     #[must_use]
-    pub fn slot_count(&self) -> u32 {
-        self.slot_count
+    pub fn slot_count(&self) -> usize {
+        (self.object_slots + self.index.node_count()) as usize
     }
 
     /// The number of a node among all of both levels.
     #[must_use]
     pub fn slot(&self, item: Item) -> usize {
         (match item {
-            Item::Scene(node) => node.0,
+            Item::Scene(node) => self.object_slots + node.0,
             Item::Object(object, node) => self.first_slot[object.0 as usize] + node,
         }) as usize
     }
 
-    /// Relinks what moved and renews the bounds of inner nodes.
-    pub fn begin_frame(&mut self, view: &View<'_>) {
+    /// Relinks what moved, renews the bounds of inner nodes, and makes `history` fit: as many entries
+    /// as there are slots, and the default for nodes that the index made anew.
+    pub fn begin_frame<H: Clone + Default>(&mut self, view: &View<'_>, history: &mut Vec<H>) {
         self.index.update(view.moves);
+        history.resize(self.slot_count(), H::default());
+        for &node in self.index.rebuilt() {
+            history[(self.object_slots + node.0) as usize] = H::default();
+        }
+        let count = self.index.node_count() as usize;
         self.node_error.clear();
-        self.node_error.resize(self.index.node_count() as usize, ClipError::ZERO);
-        // Children have larger numbers than parents, so one pass from the back reaches the root.
-        for number in (0..self.index.node_count()).rev() {
-            let node = NodeId(number);
-            let own = self
-                .index
-                .node(node)
-                .objects
-                .iter()
-                .fold(self.node_error[number as usize], |error, object| {
-                    error.max(&view.objects[object.0 as usize].error)
-                });
-            self.node_error[number as usize] = own;
-            if let Some(parent) = self.index.parent(node) {
-                let slot = &mut self.node_error[parent.0 as usize];
-                *slot = slot.max(&own);
+        self.node_error.resize(count, ClipError::ZERO);
+        self.node_weight.clear();
+        self.node_weight.resize(count, Weight::default());
+        for &node in self.index.top_down().iter().rev() {
+            let number = node.0 as usize;
+            for &object in self.index.node(node).objects {
+                let error = &view.objects[object.0 as usize].error;
+                self.node_error[number] = self.node_error[number].max(error);
+                let whole = self.object_weight(object, 0);
+                self.node_weight[number].add(whole);
             }
+            if let Some(parent) = self.index.parent(node) {
+                let (error, weight) = (self.node_error[number], self.node_weight[number]);
+                let parent = parent.0 as usize;
+                self.node_error[parent] = self.node_error[parent].max(&error);
+                self.node_weight[parent].add(weight);
+            }
+        }
+    }
+
+    fn object_weight(&self, object: ObjectId, node: u32) -> Weight {
+        let mesh = self.partition.mesh(object);
+        let (first, end) = mesh.tree.as_ref().map_or((0, 1), |tree| {
+            let node = &tree.nodes[node as usize];
+            (node.first_part, node.end_part)
+        });
+        let triangles = self.partition.triangles_between(object, first, end);
+        Weight { parts: u64::from(end - first), triangles }
+    }
+
+    /// What drawing everything at and below a node would take.
+    #[must_use]
+    pub fn weight(&self, item: Item) -> Weight {
+        match item {
+            Item::Scene(node) => self.node_weight[node.0 as usize],
+            Item::Object(object, node) => self.object_weight(object, node),
+        }
+    }
+
+    /// Whether the node stands for one part.
+    #[must_use]
+    pub fn is_part(&self, item: Item) -> bool {
+        match item {
+            Item::Scene(_) => false,
+            Item::Object(object, node) => self
+                .partition
+                .mesh(object)
+                .tree
+                .as_ref()
+                .is_none_or(|tree| tree.nodes[node as usize].children.is_none()),
         }
     }
 
@@ -99,7 +183,9 @@ impl Scenery {
     fn clip_box(&self, view: &View<'_>, item: Item) -> Option<ClipBox> {
         Some(match item {
             Item::Scene(node) => {
-                let aabb = self.index.node(node).query_box?;
+                let this = self.index.node(node);
+                let tight = this.tight_box.filter(|_| self.knobs.tighten);
+                let aabb = tight.or(this.query_box)?;
                 ClipBox::new(&aabb, &view.clip_from_world, &self.node_error[node.0 as usize])
             }
             Item::Object(object, node) => {
@@ -148,6 +234,39 @@ impl Scenery {
         }
     }
 
+    /// What to ask about in the place of `proxy`, the node's own: the boxes below it, at most
+    /// [`TIGHTER_LEVELS`] down, while their surface together is within [`TIGHTER_SURFACE`] of the
+    /// node's (Mattausch, Bittner & Wimmer 2008, section 4.2). Boxes that cannot be asked about keep
+    /// their parent's.
+    pub(super) fn tighter_proxies(&self, view: &View<'_>, item: Item, proxy: Proxy) -> Vec<Proxy> {
+        let Item::Object(object, node) = item else { return vec![proxy] };
+        let Some(tree) = &self.partition.mesh(object).tree else { return vec![proxy] };
+        let surface = |node: u32| {
+            let size = tree.nodes[node as usize].bounds.size();
+            size.x * size.y + size.y * size.z + size.z * size.x
+        };
+        let allowed = surface(node) * TIGHTER_SURFACE;
+        let mut level = vec![node];
+        for _ in 0..TIGHTER_LEVELS {
+            let below =
+                |&node: &u32| tree.nodes[node as usize].children.map_or(vec![node], Vec::from);
+            let next: Vec<u32> = level.iter().flat_map(below).collect();
+            if next.iter().map(|&node| surface(node)).sum::<f64>() > allowed {
+                break;
+            }
+            level = next;
+        }
+        let mut proxies = Vec::with_capacity(level.len());
+        for &node in &level {
+            match self.appearance(view, Item::Object(object, node)) {
+                Appearance::Nowhere => {}
+                Appearance::Certain => return vec![proxy],
+                Appearance::Ask(_, proxy) => proxies.push(proxy),
+            }
+        }
+        proxies
+    }
+
     /// The inflated box of an object's node; scene nodes keep the rectangle.
     fn box_proxy(&self, view: &View<'_>, item: Item) -> Option<Proxy> {
         let Item::Object(object, node) = item else { return None };
@@ -185,7 +304,7 @@ impl Scenery {
         let mut objects: Vec<(f64, ObjectId)> = Vec::new();
         for &object in self.index.node(node).objects {
             let mesh = self.partition.mesh(object);
-            if mesh.tree.is_some() {
+            if mesh.tree.is_some() || self.knobs.treeless_items {
                 let center = view.objects[object.0 as usize].bounds.center();
                 objects.push((center.distance_squared(view.camera.eye), object));
             } else if !view.object_outside_frustum(object.0) {
@@ -205,7 +324,9 @@ impl Scenery {
         pen: &mut Pen<'_>,
         out: &mut Vec<Item>,
     ) {
-        let tree = self.partition.mesh(object).tree.as_ref().expect("only trees have nodes");
+        let Some(tree) = &self.partition.mesh(object).tree else {
+            return pen.draw(self.partition.first_part(object));
+        };
         let this = &tree.nodes[node as usize];
         let Some([low, high]) = this.children else {
             let first = self.partition.first_part(object);

@@ -2,7 +2,7 @@
 //! time, no history. It draws the least and waits the most.
 
 use super::scenery::Appearance;
-use super::{Culler, CullerSetup, Item, Pen, Scenery, View};
+use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View};
 use crate::index::NodeId;
 use crate::oracle::OracleError;
 
@@ -15,7 +15,7 @@ impl Simple {
     /// Over the index and partition of `setup`.
     #[must_use]
     pub fn new(setup: CullerSetup) -> Self {
-        Self { scenery: Scenery::new(setup) }
+        Self { scenery: Scenery::new(setup, SceneryKnobs::default()) }
     }
 }
 
@@ -25,7 +25,7 @@ impl Culler for Simple {
     }
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
-        self.scenery.begin_frame(view);
+        self.scenery.begin_frame::<()>(view, &mut Vec::new());
         let mut stack = vec![Item::Scene(NodeId(0))];
         let (mut next, mut answers) = (Vec::new(), Vec::new());
         while let Some(item) = stack.pop() {

@@ -1,7 +1,7 @@
 //! `vfc`, the paper's "VFC only": frustum culling over the same two levels, no questions. What it
 //! draws is the ceiling of what occlusion culling can save.
 
-use super::{Culler, CullerSetup, Item, Pen, Scenery, View};
+use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View};
 use crate::index::NodeId;
 use crate::oracle::OracleError;
 
@@ -14,7 +14,7 @@ impl ViewFrustum {
     /// Over the index and partition of `setup`.
     #[must_use]
     pub fn new(setup: CullerSetup) -> Self {
-        Self { scenery: Scenery::new(setup) }
+        Self { scenery: Scenery::new(setup, SceneryKnobs::default()) }
     }
 }
 
@@ -24,7 +24,7 @@ impl Culler for ViewFrustum {
     }
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
-        self.scenery.begin_frame(view);
+        self.scenery.begin_frame::<()>(view, &mut Vec::new());
         let mut stack = vec![Item::Scene(NodeId(0))];
         let mut next = Vec::new();
         while let Some(item) = stack.pop() {

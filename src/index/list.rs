@@ -26,6 +26,10 @@ impl Index for List {
 
     fn update(&mut self, _: &[Move]) {}
 
+    fn top_down(&self) -> &[NodeId] {
+        &[NodeId(0)]
+    }
+
     fn node_count(&self) -> u32 {
         1
     }
@@ -33,7 +37,7 @@ impl Index for List {
     fn node(&self, node: NodeId) -> Node<'_> {
         assert_eq!(node, NodeId(0), "a list has one node");
         let subtree_objects = self.objects.len() as u32;
-        Node { query_box: None, objects: &self.objects, subtree_objects }
+        Node { query_box: None, tight_box: None, objects: &self.objects, subtree_objects }
     }
 
     fn children(&self, _: NodeId, _: DVec3, _: &mut Vec<NodeId>) -> usize {

@@ -13,7 +13,7 @@ use crate::part::ObjectId;
 pub use list::List;
 pub use two_level_bsp::TwoLevelBsp;
 
-/// A node of an index. Node 0 is the root, and children have larger numbers than their parents.
+/// A node of an index. Node 0 is the root.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct NodeId(pub u32);
 
@@ -43,6 +43,9 @@ pub struct Node<'a> {
     /// The box asked about: of the subspace. `None` where the contents may stick out of it, so that
     /// the node is visible without a question.
     pub query_box: Option<Aabb>,
+    /// The tight box of everything at and below the node, where the index has one: only while the
+    /// contents have not changed for several updates (Kovalčík & Sochor 2006, end of section 3.4).
+    pub tight_box: Option<Aabb>,
     /// Objects linked to the node itself.
     pub objects: &'a [ObjectId],
     /// How many objects hang at and below the node. A node with none can be passed over.
@@ -57,7 +60,15 @@ pub trait Index {
     /// Takes over the new boxes. Objects not named stay where they were.
     fn update(&mut self, moves: &[Move]);
 
-    /// How many nodes there are, at least one.
+    /// The nodes that the latest update made anew: what was remembered of these numbers is void.
+    fn rebuilt(&self) -> &[NodeId] {
+        &[]
+    }
+
+    /// Every node in use, parents before children.
+    fn top_down(&self) -> &[NodeId];
+
+    /// One more than the largest number of a node, at least one. Numbers may be out of use.
     fn node_count(&self) -> u32;
 
     /// A node's contents.

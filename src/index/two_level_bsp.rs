@@ -6,11 +6,16 @@
 //!    and cuts few (the paper leaves the choice open: candidates are the faces of the boxes), until a
 //!    node has [`LEAF_OBJECTS`] or none helps.
 //! 2. Update: a moved object climbs until a subspace holds it, then sinks as far as one child holds it
-//!    whole. The subdivision stays as it was built. What left the space hangs at the root, whose box
-//!    is then not asked about.
+//!    whole. What left the space hangs at the root, whose box is then not asked about.
+//! 3. Lazy reconstruction (section 3.2: "after several frames the scene subdivision tree is locally
+//!    adjusted"): every [`RECONSTRUCTION_PERIOD`] updates the node that holds the most objects beyond
+//!    what it was built with is built anew, it and all below it.
+//! 4. Tight boxes (end of section 3.4): a node whose contents have stood still for [`TIGHTEN_AFTER`]
+//!    updates offers the tight box of what hangs at and below it, and loses it at once on a change.
 //!
-//! Cost: build O(n log² n); update O(depth) a moved object. It loses where many objects straddle the
-//! upper planes: they hang near the root and are looked at in every frame.
+//! Cost: build O(n log² n); update O(1) a moved object that stays in its node, else O(depth). It loses
+//! where many objects straddle the upper planes: they hang near the root and are looked at in every
+//! frame.
 
 use glam::DVec3;
 
@@ -24,6 +29,13 @@ const LEAF_OBJECTS: usize = 2;
 /// out of balance when planes are compared.
 const STRADDLE_WEIGHT: usize = 3;
 
+/// Updates between two reconstructions. The paper says "several frames".
+const RECONSTRUCTION_PERIOD: u32 = 8;
+/// A node is worth building anew if it holds so many objects more than when it was built.
+const WORTH_RECONSTRUCTION: u32 = 2;
+/// Updates without a change after which a node's box is tightened. The paper says "several frames".
+const TIGHTEN_AFTER: u32 = 4;
+
 #[derive(Clone, Debug)]
 struct BspNode {
     space: Aabb,
@@ -32,6 +44,12 @@ struct BspNode {
     children: Option<[NodeId; 2]>,
     objects: Vec<ObjectId>,
     subtree_objects: u32,
+    /// Objects at the node itself when it was built.
+    built_with: u32,
+    /// The update in which anything at or below the node last changed.
+    changed_in: u32,
+    /// The box of everything at and below the node, while it stands still.
+    tight: Option<Aabb>,
 }
 
 /// The scene tree.
@@ -42,6 +60,17 @@ pub struct TwoLevelBsp {
     node_of_object: Vec<NodeId>,
     /// Objects at the root that stick out of the space.
     escaped: u32,
+    /// Numbers out of use.
+    free: Vec<NodeId>,
+    /// Nodes in use, parents before children.
+    order: Vec<NodeId>,
+    rebuilt: Vec<NodeId>,
+    /// Updates so far.
+    updates: u32,
+    /// The last update in which anything moved.
+    moved_in: u32,
+    /// Whether anything moved since the last reconstruction.
+    stale: bool,
 }
 
 impl TwoLevelBsp {
@@ -55,47 +84,162 @@ impl TwoLevelBsp {
             node_of_object: vec![NodeId(0); bounds.len()],
             bounds,
             escaped: 0,
+            free: Vec::new(),
+            order: Vec::new(),
+            rebuilt: Vec::new(),
+            updates: 0,
+            moved_in: 0,
+            stale: false,
         };
         let all: Vec<u32> = (0..entries.len() as u32).collect();
-        tree.build(space, None, &all);
-        for object in 0..tree.bounds.len() {
-            let id = ObjectId(object as u32);
-            let node = tree.home(NodeId(0), &tree.bounds[object]);
-            tree.link(id, node);
-        }
+        let root = tree.node_for(space, None);
+        tree.build(root, &all);
+        tree.hang(root, &all);
+        tree.renew_order();
         tree
     }
 
-    fn build(&mut self, space: Aabb, parent: Option<NodeId>, inside: &[u32]) -> NodeId {
-        let node = NodeId(self.nodes.len() as u32);
-        self.nodes.push(BspNode {
+    /// An empty leaf, under a number out of use where there is one.
+    fn node_for(&mut self, space: Aabb, parent: Option<NodeId>) -> NodeId {
+        let node = BspNode {
             space,
             parent,
             plane: (0, 0.0),
             children: None,
             objects: Vec::new(),
             subtree_objects: 0,
-        });
-        if inside.len() > LEAF_OBJECTS
-            && let Some((axis, at)) = self.choose(inside)
-        {
-            let pick = |keep: &dyn Fn(&Aabb) -> bool| -> Vec<u32> {
-                inside.iter().copied().filter(|&o| keep(&self.bounds[o as usize])).collect()
-            };
-            let low = pick(&|b| b.max[axis] <= at);
-            let high = pick(&|b| b.max[axis] > at && b.min[axis] >= at);
-            let (mut low_space, mut high_space) = (space, space);
-            low_space.max[axis] = at;
-            high_space.min[axis] = at;
-            let children = [
-                self.build(low_space, Some(node), &low),
-                self.build(high_space, Some(node), &high),
-            ];
-            let this = &mut self.nodes[node.0 as usize];
-            this.plane = (axis, at);
-            this.children = Some(children);
+            built_with: 0,
+            changed_in: self.updates,
+            tight: None,
+        };
+        if let Some(number) = self.free.pop() {
+            self.nodes[number.0 as usize] = node;
+            return number;
         }
-        node
+        self.nodes.push(node);
+        NodeId(self.nodes.len() as u32 - 1)
+    }
+
+    /// Parts the leaf `node`, which is to hold `inside`.
+    fn build(&mut self, node: NodeId, inside: &[u32]) {
+        if inside.len() <= LEAF_OBJECTS {
+            return;
+        }
+        let Some((axis, at)) = self.choose(inside) else { return };
+        let pick = |keep: &dyn Fn(&Aabb) -> bool| -> Vec<u32> {
+            inside.iter().copied().filter(|&o| keep(&self.bounds[o as usize])).collect()
+        };
+        let low = pick(&|b| b.max[axis] <= at);
+        let high = pick(&|b| b.max[axis] > at && b.min[axis] >= at);
+        let space = self.nodes[node.0 as usize].space;
+        let (mut low_space, mut high_space) = (space, space);
+        low_space.max[axis] = at;
+        high_space.min[axis] = at;
+        let children = [low_space, high_space].map(|space| self.node_for(space, Some(node)));
+        let this = &mut self.nodes[node.0 as usize];
+        this.plane = (axis, at);
+        this.children = Some(children);
+        self.build(children[0], &low);
+        self.build(children[1], &high);
+    }
+
+    /// Hangs `objects`, which hang nowhere, at their homes at and below `node`.
+    fn hang(&mut self, node: NodeId, objects: &[u32]) {
+        for &object in objects {
+            let home = self.home(node, &self.bounds[object as usize]);
+            self.link(ObjectId(object), home);
+        }
+        let mut stack = vec![node];
+        while let Some(node) = stack.pop() {
+            let this = &mut self.nodes[node.0 as usize];
+            this.built_with = this.objects.len() as u32;
+            stack.extend(this.children.iter().flatten());
+        }
+    }
+
+    fn renew_order(&mut self) {
+        self.order.clear();
+        let mut stack = vec![NodeId(0)];
+        while let Some(node) = stack.pop() {
+            self.order.push(node);
+            stack.extend(self.nodes[node.0 as usize].children.iter().flatten());
+        }
+    }
+
+    /// Builds the subtree anew whose root has gained the most objects of its own; the smaller number
+    /// among equals.
+    fn reconstruct(&mut self) {
+        let gained = |&node: &NodeId| {
+            let this = &self.nodes[node.0 as usize];
+            (this.objects.len() as u32).saturating_sub(this.built_with)
+        };
+        let worst = self.order.iter().copied().max_by_key(|n| (gained(n), std::cmp::Reverse(*n)));
+        let Some(worst) = worst.filter(|node| gained(node) >= WORTH_RECONSTRUCTION) else { return };
+        self.touch(worst);
+        let mut objects = Vec::new();
+        let mut stack = vec![worst];
+        while let Some(node) = stack.pop() {
+            objects.extend(self.nodes[node.0 as usize].objects.iter().map(|o| o.0));
+            stack.extend(self.nodes[node.0 as usize].children.iter().flatten());
+            if node != worst {
+                self.free.push(node);
+            }
+        }
+        objects.sort_unstable();
+        // Lowest numbers are used first, whatever the history.
+        self.free.sort_unstable_by(|a, b| b.cmp(a));
+        for &object in &objects {
+            self.unlink(ObjectId(object));
+        }
+        let this = &mut self.nodes[worst.0 as usize];
+        this.children = None;
+        if worst == NodeId(0) {
+            // The root may grow to where things now are.
+            this.space = self.bounds.iter().fold(this.space, |space, b| space.union(b));
+            self.rebuilt.push(worst);
+        }
+        self.build(worst, &objects);
+        self.hang(worst, &objects);
+        self.renew_order();
+        let mut stack: Vec<NodeId> =
+            self.nodes[worst.0 as usize].children.into_iter().flatten().collect();
+        while let Some(node) = stack.pop() {
+            self.rebuilt.push(node);
+            stack.extend(self.nodes[node.0 as usize].children.iter().flatten());
+        }
+    }
+
+    /// Says of a node and all above it that they changed in this update.
+    fn touch(&mut self, node: NodeId) {
+        let mut at = Some(node);
+        while let Some(node) = at {
+            let this = &mut self.nodes[node.0 as usize];
+            if this.changed_in == self.updates && this.tight.is_none() {
+                break;
+            }
+            this.changed_in = self.updates;
+            this.tight = None;
+            at = this.parent;
+        }
+    }
+
+    /// Gives tight boxes to the nodes that have stood still long enough.
+    fn tighten(&mut self) {
+        if self.updates > self.moved_in + TIGHTEN_AFTER {
+            return;
+        }
+        for place in (0..self.order.len()).rev() {
+            let this = &self.nodes[self.order[place].0 as usize];
+            if this.tight.is_some() || this.changed_in + TIGHTEN_AFTER > self.updates {
+                continue;
+            }
+            let own = this.objects.iter().map(|o| self.bounds[o.0 as usize]);
+            let below = this.children.iter().flatten().map(|c| {
+                self.nodes[c.0 as usize].tight.expect("below what stands still nothing changed")
+            });
+            let tight = own.chain(below).fold(Aabb::EMPTY, |all, b| all.union(&b));
+            self.nodes[self.order[place].0 as usize].tight = Some(tight);
+        }
     }
 
     /// The plane with the least of imbalance + weighted straddlers, over the upper faces of the
@@ -124,14 +268,39 @@ impl TwoLevelBsp {
         best.map(|(_, axis, at)| (axis, at))
     }
 
+    /// Whether a tight box is that of the contents, and only there while nothing moves.
+    fn check_tight(&self, number: u32, node: &BspNode) -> Result<(), String> {
+        let Some(tight) = node.tight else { return Ok(()) };
+        if node.changed_in + TIGHTEN_AFTER > self.updates {
+            return Err(format!("node {number} is tight, but changed in {}", node.changed_in));
+        }
+        let boxes = node.objects.iter().map(|o| &self.bounds[o.0 as usize]);
+        let below = node.children.iter().flatten().map(|c| &self.nodes[c.0 as usize].tight);
+        let all_below = below.flatten().count() == node.children.map_or(0, |c| c.len());
+        if !(all_below && boxes.clone().all(|b| tight.contains(b))) {
+            return Err(format!("node {number} has a tight box that does not hold its contents"));
+        }
+        Ok(())
+    }
+
     /// The smallest node at or below `from` that holds `bounds`, given that `from` does or is the
     /// root.
     fn home(&self, from: NodeId, bounds: &Aabb) -> NodeId {
         let mut node = from;
-        while let Some(children) = self.nodes[node.0 as usize].children {
-            let holds = |child: &NodeId| self.nodes[child.0 as usize].space.contains(bounds);
-            let Some(&child) = children.iter().find(|child| holds(child)) else { break };
-            node = child;
+        if !self.nodes[from.0 as usize].space.contains(bounds) {
+            return from;
+        }
+        // Inside a node only its plane tells the children apart.
+        while let BspNode { children: Some([low, high]), plane: (axis, at), .. } =
+            self.nodes[node.0 as usize]
+        {
+            node = if bounds.max[axis] <= at {
+                low
+            } else if bounds.min[axis] >= at {
+                high
+            } else {
+                break;
+            };
         }
         node
     }
@@ -175,22 +344,43 @@ impl Index for TwoLevelBsp {
     }
 
     fn update(&mut self, moves: &[Move]) {
+        self.updates += 1;
+        self.rebuilt.clear();
+        if !moves.is_empty() {
+            (self.moved_in, self.stale) = (self.updates, true);
+        }
         for change in moves {
-            let mut node = self.node_of_object[change.object.0 as usize];
+            let old = self.node_of_object[change.object.0 as usize];
+            let mut node = old;
             while !self.nodes[node.0 as usize].space.contains(&change.bounds) {
                 let Some(parent) = self.nodes[node.0 as usize].parent else { break };
                 node = parent;
             }
             let node = self.home(node, &change.bounds);
+            self.touch(old);
             // Unlinking needs the old box, to know whether the object had escaped.
-            if node != self.node_of_object[change.object.0 as usize] || node == NodeId(0) {
+            if node != old || node == NodeId(0) {
                 self.unlink(change.object);
                 self.bounds[change.object.0 as usize] = change.bounds;
                 self.link(change.object, node);
+                self.touch(node);
             } else {
                 self.bounds[change.object.0 as usize] = change.bounds;
             }
         }
+        if self.stale && self.updates.is_multiple_of(RECONSTRUCTION_PERIOD) {
+            self.stale = false;
+            self.reconstruct();
+        }
+        self.tighten();
+    }
+
+    fn rebuilt(&self) -> &[NodeId] {
+        &self.rebuilt
+    }
+
+    fn top_down(&self) -> &[NodeId] {
+        &self.order
     }
 
     fn node_count(&self) -> u32 {
@@ -202,6 +392,7 @@ impl Index for TwoLevelBsp {
         let whole = node != NodeId(0) || self.escaped == 0;
         Node {
             query_box: whole.then_some(this.space),
+            tight_box: this.tight,
             objects: &this.objects,
             subtree_objects: this.subtree_objects,
         }
@@ -222,7 +413,12 @@ impl Index for TwoLevelBsp {
     fn check(&self) -> Result<(), String> {
         let mut seen = vec![0_u32; self.bounds.len()];
         let mut escaped = 0;
-        for (number, node) in self.nodes.iter().enumerate() {
+        if self.order.len() + self.free.len() != self.nodes.len() {
+            return Err(format!("{} nodes are in use or free", self.order.len() + self.free.len()));
+        }
+        for &NodeId(number) in &self.order {
+            let node = &self.nodes[number as usize];
+            self.check_tight(number, node)?;
             let below: u32 = node
                 .children
                 .iter()
@@ -234,7 +430,7 @@ impl Index for TwoLevelBsp {
             }
             for child in node.children.iter().flatten() {
                 let c = &self.nodes[child.0 as usize];
-                if c.parent != Some(NodeId(number as u32)) || !node.space.contains(&c.space) {
+                if c.parent != Some(NodeId(number)) || !node.space.contains(&c.space) {
                     return Err(format!("node {} is not inside its parent {number}", child.0));
                 }
             }
@@ -243,7 +439,7 @@ impl Index for TwoLevelBsp {
                 seen[object.0 as usize] += 1;
                 let out = !node.space.contains(bounds);
                 escaped += u32::from(out);
-                let home = NodeId(number as u32);
+                let home = NodeId(number);
                 if self.node_of_object[object.0 as usize] != home {
                     return Err(format!("object {} hangs at {number} and elsewhere", object.0));
                 }

@@ -24,7 +24,7 @@ impl Oracle for Always {
 
     fn draw_part(&mut self, _: PartId) {}
 
-    fn ask(&mut self, _: &Proxy) -> QueryId {
+    fn ask(&mut self, _: &[Proxy]) -> QueryId {
         let query = QueryId(self.asked);
         self.asked += 1;
         self.open.push(query);

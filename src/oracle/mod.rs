@@ -9,6 +9,7 @@
 //! asking order, so that no culler sees arrival times. An answer may err only towards "visible".
 
 mod always;
+mod cost;
 mod proxy_mesh;
 mod sim;
 #[cfg_attr(not(feature = "hardware"), path = "no_wgpu.rs")]
@@ -22,6 +23,7 @@ use crate::part::{PartId, Partition};
 use crate::scene::Viewport;
 
 pub use always::Always;
+pub use cost::{Amounts, CostModel};
 #[cfg(feature = "hardware")]
 use proxy_mesh::box_proxy_triangles;
 pub use sim::{Sim, part_draw, part_instance};
@@ -131,8 +133,9 @@ pub trait Oracle {
     /// Draws one part into the frame, at this point of the stream.
     fn draw_part(&mut self, part: PartId);
 
-    /// Asks, at this point of the stream, whether any sample of `proxy` would pass.
-    fn ask(&mut self, proxy: &Proxy) -> QueryId;
+    /// Asks, at this point of the stream, whether any sample of any of `proxies` would pass: one
+    /// question about all of them. About none the answer is "hidden".
+    fn ask(&mut self, proxies: &[Proxy]) -> QueryId;
 
     /// Ends the batch: everything since the last submit goes to the device, even if nothing asks.
     ///

@@ -43,6 +43,16 @@ impl GpuStage {
     }
 }
 
+/// How questions would be put to the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Questions {
+    /// An occlusion query object each.
+    #[default]
+    Queries,
+    /// Rectangles by maxima of the depth target.
+    Pyramid,
+}
+
 /// An oracle that cannot be.
 #[derive(Debug)]
 pub enum Hardware {}
@@ -52,7 +62,7 @@ impl Hardware {
     ///
     /// # Errors
     /// None.
-    pub fn new(stage: &Arc<GpuStage>) -> Result<Self, OracleError> {
+    pub fn new(stage: &Arc<GpuStage>, _: Questions) -> Result<Self, OracleError> {
         match **stage {}
     }
 }
@@ -70,7 +80,7 @@ impl Oracle for Hardware {
         match *self {}
     }
 
-    fn ask(&mut self, _: &Proxy) -> QueryId {
+    fn ask(&mut self, _: &[Proxy]) -> QueryId {
         match *self {}
     }
 

@@ -104,9 +104,9 @@ impl Oracle for Sim {
         self.waiting.push(part);
     }
 
-    fn ask(&mut self, proxy: &Proxy) -> QueryId {
+    fn ask(&mut self, proxies: &[Proxy]) -> QueryId {
         self.flush();
-        let visible = match *proxy {
+        let any = |proxy: &Proxy| match *proxy {
             Proxy::Rectangle { min, max, depth } => self.image.any_rectangle(min, max, depth),
             Proxy::Box { clip_from_box, min, max } => {
                 let (positions, triangles) = box_triangles(min, max);
@@ -122,6 +122,7 @@ impl Oracle for Sim {
                 fast::any(&self.image, &draw)
             }
         };
+        let visible = proxies.iter().any(any);
         let query = QueryId(self.asked);
         self.asked += 1;
         self.open.push(Answer { query, visible });

@@ -1,6 +1,9 @@
 //! Cuts a mesh into parts by axis-aligned planes (Kovalčík & Sochor 2006, section 3.1): recursively,
 //! splitting the triangles that cross, until a leaf is under the limit.
 //!
+//! With [`Crossing::Whole`] nothing is split: a triangle goes to the side of its middle, and the axis
+//! along which the triangles reach farthest is taken.
+//!
 //! The paper does not say how planes are chosen; here each axis offers the median of its triangles'
 //! centres and the axis with the smaller larger side wins. A cut vertex is computed from the lower
 //! end of its edge towards the upper one, so both triangles of the edge, and the fragments on both
@@ -11,7 +14,7 @@
 use std::collections::BTreeMap;
 
 use super::tree::{ObjectNode, ObjectTree};
-use super::{Part, PartedMesh, PartitionKnobs};
+use super::{Crossing, Part, PartedMesh, PartitionKnobs};
 use crate::math::Aabb;
 use crate::scene::Mesh;
 
@@ -41,6 +44,7 @@ pub(super) fn cut(mesh: &Mesh, knobs: PartitionKnobs) -> PartedMesh {
     let mut cutter = Cutter {
         positions: mesh.positions().to_vec(),
         limit: knobs.leaf_triangles as usize,
+        crossing: knobs.crossing,
         nodes: Vec::new(),
         leaves: Vec::new(),
     };
@@ -51,6 +55,7 @@ pub(super) fn cut(mesh: &Mesh, knobs: PartitionKnobs) -> PartedMesh {
 struct Cutter {
     positions: Vec<[f32; 3]>,
     limit: usize,
+    crossing: Crossing,
     nodes: Vec<ObjectNode>,
     leaves: Vec<Vec<Fragment>>,
 }
@@ -94,7 +99,7 @@ impl Cutter {
 
     /// The best of the three medians, or `None` where none parts the triangles well enough.
     fn choose(&self, fragments: &[Fragment]) -> Option<(usize, f32)> {
-        let mut best: Option<(usize, usize, f32)> = None;
+        let mut best: Option<(f64, usize, f32)> = None;
         for axis in 0..3 {
             let extent = |f: &Fragment| {
                 let c = f.corners.map(|v| self.coordinate(v, axis));
@@ -105,15 +110,24 @@ impl Cutter {
             let middle = centers.len() / 2;
             let (_, &mut at, _) = centers.select_nth_unstable_by(middle, f32::total_cmp);
             let (mut low_count, mut high_count) = (0, 0);
+            let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
             for (low, high) in fragments.iter().map(extent) {
-                // The same three-way choice as in `split`.
-                low_count += usize::from(high <= at || low < at);
-                high_count += usize::from(high > at);
+                // The same choice as in `split`.
+                let whole = self.crossing == Crossing::Whole;
+                let below = low * 0.5 + high * 0.5 <= at;
+                low_count += usize::from(if whole { below } else { high <= at || low < at });
+                high_count += usize::from(if whole { !below } else { high > at });
+                (least, most) = (least.min(low), most.max(high));
             }
             let larger = low_count.max(high_count);
             let parts_well = larger * 8 <= fragments.len() * MOST_KEPT_EIGHTHS;
-            if parts_well && best.is_none_or(|(least, ..)| larger < least) {
-                best = Some((larger, axis, at));
+            // Both costs are smaller for a better axis.
+            let cost = match self.crossing {
+                Crossing::Split => larger as f64,
+                Crossing::Whole => f64::from(least) - f64::from(most),
+            };
+            if parts_well && best.is_none_or(|(least, ..)| cost < least) {
+                best = Some((cost, axis, at));
             }
         }
         best.map(|(_, axis, at)| (axis, at))
@@ -126,7 +140,12 @@ impl Cutter {
         let mut cuts = BTreeMap::new();
         for &fragment in from {
             let side = fragment.corners.map(|v| self.coordinate(v, axis));
-            if side.iter().all(|&c| c <= at) {
+            if self.crossing == Crossing::Whole {
+                let least = side[0].min(side[1]).min(side[2]);
+                let most = side[0].max(side[1]).max(side[2]);
+                let below = least * 0.5 + most * 0.5 <= at;
+                if below { &mut low } else { &mut high }.push(fragment);
+            } else if side.iter().all(|&c| c <= at) {
                 low.push(fragment);
             } else if side.iter().all(|&c| c >= at) {
                 high.push(fragment);

@@ -22,11 +22,24 @@ pub struct PartitionKnobs {
     /// A leaf of an object tree holds at most this many triangles, unless no plane can part them.
     /// At least 1. An object with no more than this is one part and has no tree.
     pub leaf_triangles: u32,
+    /// What becomes of a triangle that a plane crosses.
+    pub crossing: Crossing,
+}
+
+/// What becomes of a triangle that the plane between two parts crosses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Crossing {
+    /// It is split, as in the paper: parts do not overlap, triangles become more.
+    #[default]
+    Split,
+    /// It goes whole to the side of its middle: no new triangles and no cracks, but parts and the
+    /// tight boxes of the tree overlap. What the paper's conclusion asks for.
+    Whole,
 }
 
 impl Default for PartitionKnobs {
     fn default() -> Self {
-        Self { leaf_triangles: 3072 }
+        Self { leaf_triangles: 3072, crossing: Crossing::Split }
     }
 }
 
@@ -203,6 +216,28 @@ impl Partition {
         assert!(part.0 < self.part_count(), "part {} of {}", part.0, self.part_count());
         let object = self.first_part.partition_point(|&first| first <= part.0) - 1;
         (ObjectId(object as u32), part.0 - self.first_part[object])
+    }
+
+    /// The run of vertices and triangles of a part.
+    ///
+    /// # Panics
+    /// For an id beyond the last part.
+    #[must_use]
+    pub fn part(&self, part: PartId) -> &Part {
+        let (object, local) = self.locate(part);
+        &self.mesh(object).parts[local as usize]
+    }
+
+    /// Triangles of the parts `first..end` of an object's mesh, counted from its first part.
+    ///
+    /// # Panics
+    /// For a part beyond the mesh's last.
+    #[must_use]
+    pub fn triangles_between(&self, object: ObjectId, first: u32, end: u32) -> u64 {
+        let parts = &self.mesh(object).parts[first as usize..end as usize];
+        parts.last().map_or(0, |last| {
+            u64::from(last.first_triangle + last.triangle_count - parts[0].first_triangle)
+        })
     }
 
     fn locate_draw(&self, draw: u32) -> (ObjectId, u32) {

@@ -1,8 +1,12 @@
 //! What people look at: the table of a run, its lines as JSON, and pictures. Reports read traces and
 //! gates; they decide nothing.
 
+mod chart;
+mod comparison;
 mod picture;
 mod row;
 
+pub use chart::{Chart, Series};
+pub use comparison::{Comparison, Published, TABLE_1};
 pub use picture::{Shown, depth_picture, part_picture, picture_png, top_view};
 pub use row::{JSON_SCHEMA, Row, table};

@@ -1,6 +1,7 @@
 //! A scene with its parts and effects, and its state at one frame: matrices, boxes, moves.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use glam::{DMat4, DVec3};
 use plainsight_reference::fast::Options;
@@ -21,6 +22,8 @@ pub struct World {
     pub partition: Arc<Partition>,
     /// How the reference draws; nothing that is compared depends on it.
     pub render: Options,
+    /// Wall time that cutting the meshes took, seconds; a figure for reports.
+    pub build_seconds: f64,
     effects: effect::World,
 }
 
@@ -29,15 +32,24 @@ impl World {
     #[must_use]
     pub fn new(scene: Scene, knobs: PartitionKnobs) -> Self {
         let scene = Arc::new(scene);
+        // Wall time is reported and never compared.
+        let start = Instant::now();
         let partition = Arc::new(Partition::new(&scene, knobs));
+        let build_seconds = start.elapsed().as_secs_f64();
         let effects = effect::World::new(&scene);
-        Self { scene, partition, render: Options::default(), effects }
+        Self { scene, partition, render: Options::default(), build_seconds, effects }
     }
 
     /// The same, with the reference drawing in another way.
     #[must_use]
     pub fn rendered(self, render: Options) -> Self {
         Self { render, ..self }
+    }
+
+    /// How many objects some effect moves.
+    #[must_use]
+    pub fn moving_count(&self) -> usize {
+        self.effects.moving().len()
     }
 
     /// What its oracles work on.

@@ -100,14 +100,15 @@ pub fn run(
     Ok(traces)
 }
 
-fn truth_facts(truth: &Truth) -> (u32, u64) {
-    (truth.visible_parts, truth.hash)
+/// What a trace keeps of the truth: visible parts, their triangles, the image's hash.
+fn truth_facts(truth: &Truth) -> (u32, u64, u64) {
+    (truth.visible_parts, truth.visible_triangles, truth.hash)
 }
 
 fn shoot(
     world: &World,
     state: &FrameState,
-    (visible_parts, truth_hash): (u32, u64),
+    (visible_parts, visible_triangles, truth_hash): (u32, u64, u64),
     lane: &mut Lane<'_>,
     culler: &mut dyn Culler,
 ) -> Result<Shot, OracleError> {
@@ -115,7 +116,7 @@ fn shoot(
     // Wall time is reported and never compared.
     let start = Instant::now();
     oracle.begin_frame(&FrameView { frame: state.frame, clip_from_object: &state.matrices })?;
-    let mut pen = Pen::new(oracle, world.partition.part_count());
+    let mut pen = Pen::new(oracle, &world.partition);
     culler.frame(&state.view(world), &mut pen)?;
     let (drawn, counts, events_hash) = pen.finish()?;
     let wall_ns = start.elapsed().as_nanos() as u64;
@@ -134,6 +135,7 @@ fn shoot(
         frame: state.frame,
         drawn_parts,
         visible_parts,
+        visible_triangles,
         counts,
         events_hash,
         truth_hash,
@@ -180,7 +182,7 @@ fn repeat_first(
         let state = FrameState::at(world, t);
         for ((lane, culler), trace) in lanes.iter_mut().zip(&mut cullers).zip(traces) {
             let first = &trace.frames[t as usize];
-            let facts = (first.visible_parts, first.truth_hash);
+            let facts = (first.visible_parts, first.visible_triangles, first.truth_hash);
             let again = shoot(world, &state, facts, lane, culler.as_mut())?;
             lane.observer.repeated(first, &again.trace);
         }

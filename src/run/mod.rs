@@ -10,7 +10,7 @@ mod truth;
 pub use frame::{FrameState, World};
 pub use lane::{Lane, LaneInfo, Observer, RunError, run};
 pub use trace::{DeviceImages, FrameRecord, FrameTrace, Trace};
-pub use truth::{Truth, partition_difference, render};
+pub use truth::{Truth, depth_complexity, partition_difference, render};
 
 /// FNV-1a over whole words with a rotation, the hash of everything a trace compares.
 #[must_use]

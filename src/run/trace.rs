@@ -2,7 +2,7 @@
 
 use super::{FrameState, HASH_START, LaneInfo, Truth, World, fold};
 use crate::cull::Counts;
-use crate::oracle::ReadBack;
+use crate::oracle::{Amounts, ReadBack};
 use crate::part::PartId;
 
 /// What a real device drew in one frame.
@@ -42,6 +42,8 @@ pub struct FrameTrace {
     pub drawn_parts: u32,
     /// Parts the truth shows.
     pub visible_parts: u32,
+    /// Triangles of those parts.
+    pub visible_triangles: u64,
     /// Questions, answers, round trips.
     pub counts: Counts,
     /// Hash of every draw, question and answer in order.
@@ -78,6 +80,18 @@ impl Trace {
 }
 
 impl FrameTrace {
+    /// The work as a cost model weighs it.
+    #[must_use]
+    pub fn amounts(&self) -> Amounts {
+        Amounts {
+            parts: u64::from(self.drawn_parts),
+            triangles: self.counts.triangles,
+            queries: self.counts.queries,
+            proxies: self.counts.proxies,
+            trips: self.counts.round_trips,
+        }
+    }
+
     /// Adds what must repeat of this frame to `hash`.
     #[must_use]
     pub fn fold_into(&self, hash: u64) -> u64 {

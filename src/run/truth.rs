@@ -4,7 +4,7 @@ use plainsight_reference::fast::Instance;
 use plainsight_reference::{Image, fast};
 
 use super::{FrameState, World};
-use crate::oracle::part_instance;
+use crate::oracle::{part_draw, part_instance};
 use crate::part::{PartId, PartitionKnobs};
 
 /// What the reference says of one frame.
@@ -15,6 +15,8 @@ pub struct Truth {
     pub visible_pixels: Vec<u32>,
     /// How many parts show at least one sample.
     pub visible_parts: u32,
+    /// Triangles of those parts: what a culler that knew the truth would draw.
+    pub visible_triangles: u64,
     /// Hash of the image.
     pub hash: u64,
 }
@@ -37,9 +39,12 @@ impl Truth {
             last = Some((draw, part));
             visible_pixels[part.0 as usize] += 1;
         }
-        let visible_parts = visible_pixels.iter().filter(|&&pixels| pixels > 0).count() as u32;
+        let visible = || (0..).zip(&visible_pixels).filter(|&(_, &pixels)| pixels > 0);
+        let visible_parts = visible().count() as u32;
+        let triangles = |(part, _)| u64::from(world.partition.part(PartId(part)).triangle_count);
+        let visible_triangles = visible().map(triangles).sum();
         let hash = image.hash();
-        Self { image, visible_pixels, visible_parts, hash }
+        Self { image, visible_pixels, visible_parts, visible_triangles, hash }
     }
 
     /// The part that a sample shows.
@@ -56,11 +61,30 @@ pub fn render(world: &World, state: &FrameState, parts: &[PartId], image: &mut I
     fast::render(image, &instances, world.render);
 }
 
+/// How many triangles cover a sample on average, over the samples that any covers: all of them, near
+/// and far, as if nothing hid anything. 0 where nothing is covered.
+#[must_use]
+pub fn depth_complexity(world: &World, state: &FrameState) -> f64 {
+    use rayon::prelude::*;
+    let mut image = Image::new(world.scene.viewport);
+    let parts = 0..world.partition.part_count();
+    // Against an empty image every covered sample passes.
+    let count = |part| {
+        let draw = part_draw(&world.partition, PartId(part), &state.matrices);
+        fast::count(&image, &draw)
+    };
+    let layers: u64 = parts.clone().into_par_iter().map(count).sum();
+    let all: Vec<PartId> = parts.map(PartId).collect();
+    render(world, state, &all, &mut image);
+    let covered = image.draw_indices().flatten().count();
+    layers as f64 / covered.max(1) as f64
+}
+
 /// Samples of frame 0 at which the cut scene shows another object or source triangle than the uncut
 /// one: what the T-junctions along the cuts cost.
 #[must_use]
 pub fn partition_difference(world: &World) -> u64 {
-    let knobs = PartitionKnobs { leaf_triangles: u32::MAX };
+    let knobs = PartitionKnobs { leaf_triangles: u32::MAX, ..PartitionKnobs::default() };
     let uncut = World::new((*world.scene).clone(), knobs).rendered(world.render);
     let sources = |world: &World| {
         let truth = Truth::of(world, &FrameState::at(world, 0));

@@ -33,6 +33,8 @@ struct SceneFile {
     name: Option<String>,
     seed: Option<u64>,
     scale: Option<f64>,
+    #[serde(default)]
+    full_size: bool,
     frames: Option<u32>,
     viewport: Option<[u32; 2]>,
     mesh: Option<PathBuf>,
@@ -110,6 +112,7 @@ pub fn load(path: &Path, knobs: &Knobs) -> Result<Scene, SceneError> {
     let merged = Knobs {
         seed: knobs.seed.or(file.seed),
         scale: knobs.scale.or(file.scale),
+        full_size: knobs.full_size || file.full_size,
         frames: knobs.frames.or(file.frames),
         viewport: knobs.viewport.or(viewport),
         mesh: knobs.mesh.clone().or_else(|| file.mesh.as_ref().map(|mesh| folder.join(mesh))),

@@ -5,17 +5,17 @@ use std::sync::{Arc, OnceLock};
 use plainsight::check::Gate;
 use plainsight::cull::{CullerKind, CullerSetup, ProxyKind};
 use plainsight::index::IndexKind;
-use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware};
-use plainsight::oracle::{Always, Oracle, Sim};
+use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware, Questions};
+use plainsight::oracle::{Always, CostModel, Oracle, Sim};
 use plainsight::part::PartitionKnobs;
 use plainsight::run::{Lane, LaneInfo, Trace, World, run};
 use plainsight::scene::Viewport;
 use plainsight::scene::generate::{Knobs, build};
 
 /// Scenes of the shared tests; `model` needs a file.
-pub(crate) const SCENES: [&str; 4] = ["bunnies", "city", "rooms", "soup"];
+pub(crate) const SCENES: [&str; 5] = ["bunnies", "powerplant", "city", "rooms", "soup"];
 /// Oracles of the shared tests.
-pub(crate) const ORACLES: [&str; 3] = ["sim", "hardware", "always"];
+pub(crate) const ORACLES: [&str; 4] = ["sim", "hardware", "pyramid", "always"];
 
 /// The device, opened once. A test that needs one fails without it.
 pub(crate) fn gpu() -> &'static Arc<Gpu> {
@@ -33,7 +33,13 @@ pub(crate) fn world(scene: &str, seed: u64, scale: f64, frames: u32) -> World {
         ..Knobs::default()
     };
     let scene = build(scene, &knobs).unwrap();
-    World::new(scene, PartitionKnobs { leaf_triangles: 256 })
+    let leaf_triangles = leaf_triangles(&scene.name);
+    World::new(scene, PartitionKnobs { leaf_triangles, ..PartitionKnobs::default() })
+}
+
+/// Most triangles in a part; the plant has far more of them at any size.
+pub(crate) fn leaf_triangles(scene: &str) -> u32 {
+    if scene == "powerplant" { 4096 } else { 256 }
 }
 
 /// An oracle by name.
@@ -42,9 +48,11 @@ pub(crate) fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
     match name {
         "sim" => Box::new(Sim::new(stage)),
         "always" => Box::<Always>::default(),
-        "hardware" => {
+        "hardware" | "pyramid" => {
             let stage = GpuStage::new(gpu(), &stage).unwrap();
-            Box::new(Hardware::new(&stage).unwrap())
+            let pyramid = name == "pyramid";
+            let questions = if pyramid { Questions::Pyramid } else { Questions::Queries };
+            Box::new(Hardware::new(&stage, questions).unwrap())
         }
         _ => unreachable!("no oracle is called {name}"),
     }
@@ -64,6 +72,7 @@ pub(crate) fn gate(
             partition: world.partition.clone(),
             index: (index.build)(&entries),
             proxy,
+            cost: CostModel::lavapipe(),
         })
     };
     let oracle = oracle(oracle_name, world);

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
 use plainsight::math::rounded_clip_matrix;
-use plainsight::oracle::wgpu::{GpuStage, Hardware};
+use plainsight::oracle::wgpu::{GpuStage, Hardware, Questions};
 use plainsight::oracle::{FrameView, Oracle, Stage, part_draw};
 use plainsight::part::{PartId, Partition, PartitionKnobs};
 use plainsight::run::{FrameState, Truth};
@@ -84,7 +84,8 @@ fn coverage_and_depth_by_class() {
         scene.objects = (0..triangles.len() as u32).map(object).collect();
         let partition = Arc::new(Partition::new(&scene, PartitionKnobs::default()));
         let stage = Stage::new(partition.clone(), VIEWPORT);
-        let mut device = Hardware::new(&GpuStage::new(gpu(), &stage).unwrap()).unwrap();
+        let mut device =
+            Hardware::new(&GpuStage::new(gpu(), &stage).unwrap(), Questions::Queries).unwrap();
         let matrices = vec![rounded_clip_matrix(&clip_from_view()); triangles.len()];
         device.begin_frame(&FrameView { frame: 0, clip_from_object: &matrices }).unwrap();
         let (mut samples, mut differ) = (0_u32, 0_u32);

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use plainsight::oracle::wgpu::{GpuStage, Hardware, QUERIES_PER_PASS};
+use plainsight::oracle::wgpu::{GpuStage, Hardware, QUERIES_PER_PASS, Questions};
 use plainsight::oracle::{Answer, FrameView, Oracle, Proxy, Sim, Stage};
 use plainsight::part::{PartId, Partition, PartitionKnobs};
 use plainsight::scene::generate::{Knobs, build};
@@ -16,7 +16,7 @@ const COVERED: [u32; 2] = [37, 29];
 /// Its depth everywhere.
 const DEPTH: f32 = 0.5;
 
-/// A screen-aligned quad over the first columns and rows of an odd viewport, seen by both oracles.
+/// A screen-aligned quad over the first columns and rows of an odd viewport, seen by every oracle.
 fn oracles() -> (Viewport, Vec<Box<dyn Oracle>>) {
     let viewport = Viewport { width: 101, height: 67 };
     let mut scene = build("soup", &Knobs { scale: Some(0.001), ..Knobs::default() }).unwrap();
@@ -29,8 +29,14 @@ fn oracles() -> (Viewport, Vec<Box<dyn Oracle>>) {
     scene.effects = Effects::default();
     let partition = Arc::new(Partition::new(&scene, PartitionKnobs::default()));
     let stage = Stage::new(partition, viewport);
-    let device = Hardware::new(&GpuStage::new(crate::common::gpu(), &stage).unwrap()).unwrap();
-    (viewport, vec![Box::new(Sim::new(stage)), Box::new(device)])
+    let device = GpuStage::new(crate::common::gpu(), &stage).unwrap();
+    let on_device = |questions| Box::new(Hardware::new(&device, questions).unwrap());
+    let oracles: Vec<Box<dyn Oracle>> = vec![
+        Box::new(Sim::new(stage)),
+        on_device(Questions::Queries),
+        on_device(Questions::Pyramid),
+    ];
+    (viewport, oracles)
 }
 
 fn begin(oracle: &mut dyn Oracle, drawn: bool) {
@@ -67,7 +73,7 @@ fn rectangles_touch_exactly_their_pixels() {
                 let (x, y) = (span(viewport.width, COVERED[0]), span(viewport.height, COVERED[1]));
                 let proxy =
                     Proxy::Rectangle { min: [x.0, y.0], max: [x.1, y.1], depth: DEPTH.next_up() };
-                let query = oracle.ask(&proxy);
+                let query = oracle.ask(&[proxy]);
                 expected.push(Answer { query, visible: x.1 > COVERED[0] || y.1 > COVERED[1] });
             }
             assert_eq!(collect(oracle.as_mut()), expected, "{} {count}", oracle.name());
@@ -80,7 +86,7 @@ fn depth_is_compared_less_or_equal() {
     for mut oracle in oracles().1 {
         begin(oracle.as_mut(), true);
         for depth in [DEPTH.next_down(), DEPTH, DEPTH.next_up(), 1.0] {
-            oracle.ask(&Proxy::Rectangle { min: [1, 1], max: [9, 9], depth });
+            oracle.ask(&[Proxy::Rectangle { min: [1, 1], max: [9, 9], depth }]);
         }
         let visible: Vec<bool> = collect(oracle.as_mut()).iter().map(|a| a.visible).collect();
         assert_eq!(visible, [true, true, false, false], "{}", oracle.name());
@@ -92,14 +98,14 @@ fn a_question_sees_only_what_was_drawn_before_it() {
     for mut oracle in oracles().1 {
         let behind = Proxy::Rectangle { min: [1, 1], max: [9, 9], depth: 0.9 };
         begin(oracle.as_mut(), false);
-        oracle.ask(&behind);
+        oracle.ask(&[behind]);
         oracle.draw_part(PartId(0));
-        oracle.ask(&behind);
+        oracle.ask(&[behind]);
         oracle.submit().unwrap();
         // A second batch before the first is collected; a question writes nothing.
-        oracle.ask(&behind);
-        oracle.ask(&Proxy::Rectangle { min: [1, 1], max: [9, 9], depth: 0.1 });
-        oracle.ask(&behind);
+        oracle.ask(&[behind]);
+        oracle.ask(&[Proxy::Rectangle { min: [1, 1], max: [9, 9], depth: 0.1 }]);
+        oracle.ask(&[behind]);
         oracle.submit().unwrap();
         let mut answers = Vec::new();
         for batch in [2, 5, 5] {
@@ -112,7 +118,64 @@ fn a_question_sees_only_what_was_drawn_before_it() {
         let left = oracle.read_back().unwrap().unwrap().depth;
         assert!(left[0] == DEPTH && left[left.len() - 1] == 1.0);
         begin(oracle.as_mut(), false);
-        oracle.ask(&behind);
+        oracle.ask(&[behind]);
         assert!(collect(oracle.as_mut())[0].visible, "a new frame is empty");
     }
+}
+
+/// A question about several proxies is answered "visible" if any of them would be, about none
+/// "hidden".
+#[test]
+fn several_proxies_make_one_question() {
+    let at = |min: [u32; 2], depth| Proxy::Rectangle { min, max: [min[0] + 2, min[1] + 2], depth };
+    let (hidden, shows) = (at([3, 3], 0.9), at([50, 40], 0.9));
+    for mut oracle in oracles().1 {
+        begin(oracle.as_mut(), true);
+        let groups: [&[Proxy]; 6] = [
+            &[],
+            &[hidden, hidden],
+            &[shows],
+            &[hidden, shows],
+            &[shows, hidden, hidden],
+            &[hidden],
+        ];
+        for group in groups {
+            oracle.ask(group);
+        }
+        let visible: Vec<bool> = collect(oracle.as_mut()).iter().map(|a| a.visible).collect();
+        assert_eq!(visible, [false, false, true, true, true, false], "{}", oracle.name());
+    }
+}
+
+/// Random rectangles and depths over a random picture: the maxima of depth answer as query objects and
+/// the reference do.
+#[test]
+fn the_pyramid_answers_as_queries_do() {
+    let world = crate::common::world("rooms", 3, 0.02, 1);
+    let state = plainsight::run::FrameState::at(&world, 0);
+    let mut answers = Vec::new();
+    for name in ["sim", "hardware", "pyramid"] {
+        let mut oracle = crate::common::oracle(name, &world);
+        let view = FrameView { frame: 0, clip_from_object: &state.matrices };
+        oracle.begin_frame(&view).unwrap();
+        (0..world.partition.part_count()).for_each(|part| oracle.draw_part(PartId(part)));
+        let mut stream = Stream::new(9, "rectangles");
+        let Viewport { width, height } = world.scene.viewport;
+        for _ in 0..600 {
+            let mut span = |side: u32| {
+                let first = stream.below(side);
+                (first, first + 1 + stream.below(side - first))
+            };
+            let (x, y) = (span(width), span(height));
+            // Depth crowds near 1; most of these are near what is stored.
+            let depth = (1.0 - stream.unit() * stream.unit() * 0.05) as f32;
+            oracle.ask(&[Proxy::Rectangle { min: [x.0, y.0], max: [x.1, y.1], depth }]);
+        }
+        answers.push(collect(oracle.as_mut()));
+    }
+    let shown = answers[0].iter().filter(|a| a.visible).count();
+    assert!((100..500).contains(&shown), "{shown} of 600 show: the test sees both answers");
+    assert_eq!(answers[1], answers[2]);
+    let same = answers[0].iter().zip(&answers[2]).filter(|(a, b)| a == b).count();
+    assert!(same >= 595, "{same} of 600 answers agree with the reference");
 }

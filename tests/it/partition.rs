@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 use plainsight::math::Aabb;
-use plainsight::part::{ObjectId, PartedMesh, Partition, PartitionKnobs};
+use plainsight::part::{Crossing, ObjectId, PartedMesh, Partition, PartitionKnobs};
+use plainsight::run::{World, partition_difference};
 
-use crate::common::{SCENES, world};
+use crate::common::{SCENES, leaf_triangles, world};
 
 fn area(triangle: [[f32; 3]; 3]) -> f64 {
     let [a, b, c] = triangle.map(|p| DVec3::from_array(p.map(f64::from)));
@@ -80,7 +81,8 @@ fn trees_are_sound_and_leaves_under_the_limit() {
                         assert_eq!((node.first_part, node.end_part), (next_part, next_part + 1));
                         next_part += 1;
                         // A leaf above the limit must be one that no plane parts.
-                        assert!(parts[0].triangle_count <= 256 || scene == "soup", "{scene}");
+                        let limit = leaf_triangles(scene);
+                        assert!(parts[0].triangle_count <= limit || scene == "soup", "{scene}");
                     }
                     Some([low, high]) => {
                         let (axis, at) = (node.plane.0 as usize, f64::from(node.plane.1));
@@ -119,11 +121,42 @@ fn the_cut_does_not_depend_on_threads() {
     let world = world("bunnies", 2, 0.05, 1);
     let cut = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let knobs = PartitionKnobs { leaf_triangles: 100 };
+        let knobs = PartitionKnobs { leaf_triangles: 100, ..PartitionKnobs::default() };
         let partition = pool.install(|| Partition::new(&world.scene, knobs));
         let of =
             |mesh: &std::sync::Arc<PartedMesh>| (mesh.triangles.clone(), mesh.positions.clone());
         partition.meshes().iter().map(of).collect::<Vec<_>>()
     };
     assert!(cut(1) == cut(3));
+}
+
+/// Whole triangles: none is added, each stands in one part, the uncut picture comes out bit for bit,
+/// and trees and leaves are as sound, but for planes that no longer part the boxes.
+#[test]
+fn whole_triangles_stay_whole() {
+    for name in SCENES {
+        let split = world(name, 2, 0.02, 1);
+        let knobs =
+            PartitionKnobs { leaf_triangles: leaf_triangles(name), crossing: Crossing::Whole };
+        let world = World::new((*split.scene).clone(), knobs);
+        let (whole, before) = (world.partition.fragment_count(), world.scene.triangle_count());
+        assert_eq!(u64::from(whole), before, "{name}");
+        assert!(whole <= split.partition.fragment_count());
+        assert_eq!(partition_difference(&world), 0, "{name}");
+        for (mesh, source) in world.partition.meshes().iter().zip(&world.scene.meshes) {
+            let every: Vec<u32> = (0..source.triangles().len() as u32).collect();
+            assert_eq!(mesh.source_of_rank, every);
+            for part in &mesh.parts {
+                let bounds = Aabb::of_points(mesh.positions_of(part));
+                assert_eq!(bounds, part.bounds);
+                let limit = leaf_triangles(name);
+                assert!(part.triangle_count <= limit || name == "soup", "{name}");
+            }
+            for node in mesh.tree.iter().flat_map(|tree| &tree.nodes) {
+                let parts = &mesh.parts[node.first_part as usize..node.end_part as usize];
+                let bounds = parts.iter().fold(Aabb::EMPTY, |all, part| all.union(&part.bounds));
+                assert_eq!(node.bounds, bounds);
+            }
+        }
+    }
 }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::images::Images;
+use super::pyramid::{Ask, Pyramid};
 use super::stage::GpuStage;
 use crate::oracle::{
     Answer, FrameView, Oracle, OracleError, Proxy, QueryId, ReadBack, box_proxy_triangles,
@@ -17,6 +18,17 @@ pub const QUERIES_PER_PASS: usize = 128;
 /// Bytes of one result.
 const RESULT_BYTES: u64 = 8;
 
+/// How questions are put to the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Questions {
+    /// An occlusion query object each.
+    #[default]
+    Queries,
+    /// Rectangles by maxima of the depth target, see `pyramid`. A box is not a rectangle: it counts as
+    /// visible unasked.
+    Pyramid,
+}
+
 /// One thing to do, in the order it was said.
 #[derive(Clone, Copy)]
 enum Event {
@@ -25,6 +37,11 @@ enum Event {
     Ask {
         first_vertex: u32,
         end_vertex: u32,
+    },
+    /// A question with its run of rectangles for the pyramid.
+    AskPyramid {
+        first: u32,
+        end: u32,
     },
 }
 
@@ -36,11 +53,40 @@ struct Slot {
     proxies: wgpu::Buffer,
 }
 
+impl Slot {
+    /// Room for `bytes` of results and for proxies of `vertices` bytes.
+    fn new(device: &wgpu::Device, bytes: u64, vertices: u64) -> Self {
+        let buffer = |size: u64, usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: None,
+                size: size.next_power_of_two(),
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let written = wgpu::BufferUsages::QUERY_RESOLVE
+            | wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::COPY_DST
+            | wgpu::BufferUsages::COPY_SRC;
+        let read = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        let proxies =
+            wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        Self {
+            queries: Vec::new(),
+            resolved: buffer(bytes, written),
+            staging: buffer(bytes, read),
+            proxies: buffer(vertices, proxies),
+        }
+    }
+}
+
 /// A batch on its way.
 struct Flight {
     slot: Option<Slot>,
     submission: wgpu::SubmissionIndex,
     queries: Vec<QueryId>,
+    /// Places in `queries` that are visible whatever the device says.
+    unasked: Vec<u32>,
 }
 
 /// Occlusion queries of a Vulkan device.
@@ -55,6 +101,11 @@ pub struct Hardware {
     events: Vec<Event>,
     open: Vec<QueryId>,
     proxy_vertices: Vec<[f32; 4]>,
+    /// Answers rectangles where query objects do not.
+    pyramid: Option<Pyramid>,
+    asks: Vec<Ask>,
+    /// Questions of the batch that are answered "visible" without the device.
+    unasked: Vec<u32>,
     flights: VecDeque<Flight>,
     free: Vec<Slot>,
 }
@@ -64,7 +115,7 @@ impl Hardware {
     ///
     /// # Errors
     /// [`OracleError::Lost`] where the device refuses.
-    pub fn new(stage: &Arc<GpuStage>) -> Result<Self, OracleError> {
+    pub fn new(stage: &Arc<GpuStage>, questions: Questions) -> Result<Self, OracleError> {
         let device = &stage.gpu.device;
         let objects = u64::from(stage.stage.partition.object_count().max(1));
         let matrices = device.create_buffer(&wgpu::BufferDescriptor {
@@ -82,6 +133,8 @@ impl Hardware {
             ],
         });
         let images = Images::new(&stage.gpu, stage.stage.viewport, false);
+        let pyramid = (questions == Questions::Pyramid)
+            .then(|| Pyramid::new(&stage.gpu, stage.stage.viewport));
         stage.gpu.healthy()?;
         Ok(Self {
             stage: Arc::clone(stage),
@@ -94,6 +147,9 @@ impl Hardware {
             events: Vec::new(),
             open: Vec::new(),
             proxy_vertices: Vec::new(),
+            pyramid,
+            asks: Vec::new(),
+            unasked: Vec::new(),
             flights: VecDeque::new(),
             free: Vec::new(),
         })
@@ -103,38 +159,86 @@ impl Hardware {
         self.stage.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
+    /// The next question's number.
+    fn number(&mut self) -> QueryId {
+        let query = QueryId(self.asked);
+        self.asked += 1;
+        self.open.push(query);
+        query
+    }
+
+    fn ask_pyramid(&mut self, proxies: &[Proxy]) -> QueryId {
+        let (first, question) = (self.asks.len() as u32, self.open.len() as u32);
+        for proxy in proxies {
+            match *proxy {
+                Proxy::Rectangle { min, max, depth } => {
+                    self.asks.push(Ask { low: min, high: max, depth, question });
+                }
+                Proxy::Box { .. } => self.unasked.push(question),
+            }
+        }
+        let end = self.asks.len() as u32;
+        self.events.push(Event::AskPyramid { first, end });
+        self.number()
+    }
+
+    /// Encodes the questions from `from` on up to the next draw; returns where it stopped.
+    fn encode_pyramid(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        slot: &Slot,
+        pyramid: &Pyramid,
+        from: usize,
+    ) -> usize {
+        let asks = self.events[from..].iter().map_while(|event| match *event {
+            Event::AskPyramid { first, end } => Some(first..end),
+            _ => None,
+        });
+        let (mut count, mut run) = (0, 0..0);
+        for ask in asks {
+            // The asks of following events follow one another.
+            let start = if count == 0 { ask.start } else { run.start };
+            run = start..ask.end;
+            count += 1;
+        }
+        if !run.is_empty() {
+            let buffers = (&slot.proxies, &slot.resolved);
+            let depth = &self.images.depth_view;
+            let (gpu, pipelines) = (&self.stage.gpu, &self.stage.pyramid);
+            pyramid.encode(gpu, pipelines, encoder, depth, buffers, run);
+        }
+        from + count
+    }
+
+    /// Sends the results of the batch on their way back.
+    fn encode_results(&self, encoder: &mut wgpu::CommandEncoder, slot: &Slot) {
+        let bytes = self.open.len() as u64 * RESULT_BYTES;
+        if self.pyramid.is_none() {
+            for set in 0..self.open.len().div_ceil(QUERIES_PER_PASS) {
+                let count = (self.open.len() - set * QUERIES_PER_PASS).min(QUERIES_PER_PASS);
+                let offset = (set * QUERIES_PER_PASS) as u64 * RESULT_BYTES;
+                let run = 0..count as u32;
+                encoder.resolve_query_set(&slot.queries[set], run, &slot.resolved, offset);
+            }
+        }
+        encoder.copy_buffer_to_buffer(&slot.resolved, 0, &slot.staging, 0, bytes);
+    }
+
     /// A slot with room for this batch, made or reused.
     fn slot(&mut self) -> Slot {
         let device = &self.stage.gpu.device;
         let sets = self.open.len().div_ceil(QUERIES_PER_PASS);
         let bytes = (sets * QUERIES_PER_PASS) as u64 * RESULT_BYTES;
         let vertices = size_of_val(self.proxy_vertices.as_slice()) as u64;
-        let buffer = |size: u64, usage| {
-            let size = size.next_power_of_two();
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: None,
-                size,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
-        let results = |size| {
-            (
-                buffer(size, wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
-                buffer(size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
-            )
-        };
-        let proxies =
-            |size| buffer(size, wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST);
-        let mut slot = self.free.pop().unwrap_or_else(|| {
-            let (resolved, staging) = results(bytes);
-            Slot { queries: Vec::new(), resolved, staging, proxies: proxies(vertices) }
-        });
-        if slot.resolved.size() < bytes {
-            (slot.resolved, slot.staging) = results(bytes);
+        let vertices = vertices.max(size_of_val(self.asks.as_slice()) as u64);
+        let mut slot = self.free.pop().unwrap_or_else(|| Slot::new(device, bytes, vertices));
+        if slot.resolved.size() < bytes || slot.proxies.size() < vertices {
+            let (bytes, vertices) =
+                (bytes.max(slot.resolved.size()), vertices.max(slot.proxies.size()));
+            slot = Slot { queries: slot.queries, ..Slot::new(device, bytes, vertices) };
         }
-        if slot.proxies.size() < vertices {
-            slot.proxies = proxies(vertices);
+        if self.pyramid.is_some() {
+            return slot;
         }
         while slot.queries.len() < sets {
             slot.queries.push(device.create_query_set(&wgpu::QuerySetDescriptor {
@@ -182,6 +286,7 @@ impl Hardware {
                     let indices = first..first + this.triangle_count * 3;
                     pass.draw_indexed(indices, this.first_vertex as i32, object.0..object.0 + 1);
                 }
+                Event::AskPyramid { .. } => return place,
                 Event::Ask { first_vertex, end_vertex } => {
                     let Some((slot, _)) = slot else { continue };
                     if queries == QUERIES_PER_PASS {
@@ -287,7 +392,7 @@ fn rectangle(viewport: Viewport, min: [u32; 2], max: [u32; 2], depth: f32) -> [[
 
 impl Oracle for Hardware {
     fn name(&self) -> &'static str {
-        "hardware"
+        if self.pyramid.is_some() { "pyramid" } else { "hardware" }
     }
 
     fn device(&self) -> Option<String> {
@@ -305,6 +410,8 @@ impl Oracle for Hardware {
         self.events.clear();
         self.open.clear();
         self.proxy_vertices.clear();
+        self.asks.clear();
+        self.unasked.clear();
         self.stage.gpu.healthy()
     }
 
@@ -312,53 +419,57 @@ impl Oracle for Hardware {
         self.events.push(Event::Draw(part));
     }
 
-    fn ask(&mut self, proxy: &Proxy) -> QueryId {
+    fn ask(&mut self, proxies: &[Proxy]) -> QueryId {
+        if self.pyramid.is_some() {
+            return self.ask_pyramid(proxies);
+        }
         let first_vertex = self.proxy_vertices.len() as u32;
-        match *proxy {
-            Proxy::Rectangle { min, max, depth } => {
-                self.proxy_vertices.extend(rectangle(self.stage.stage.viewport, min, max, depth));
-            }
-            Proxy::Box { clip_from_box, min, max } => {
-                self.proxy_vertices.extend(box_proxy_triangles(&clip_from_box, min, max));
+        for proxy in proxies {
+            match *proxy {
+                Proxy::Rectangle { min, max, depth } => {
+                    let viewport = self.stage.stage.viewport;
+                    self.proxy_vertices.extend(rectangle(viewport, min, max, depth));
+                }
+                Proxy::Box { clip_from_box, min, max } => {
+                    self.proxy_vertices.extend(box_proxy_triangles(&clip_from_box, min, max));
+                }
             }
         }
         let end_vertex = self.proxy_vertices.len() as u32;
         self.events.push(Event::Ask { first_vertex, end_vertex });
-        let query = QueryId(self.asked);
-        self.asked += 1;
-        self.open.push(query);
-        query
+        self.number()
     }
 
     fn submit(&mut self) -> Result<(), OracleError> {
         let mut encoder = self.encoder();
         let slot = (!self.open.is_empty()).then(|| self.slot());
         if let Some(slot) = &slot {
-            let vertices = bytemuck::cast_slice(&self.proxy_vertices);
-            self.stage.gpu.queue.write_buffer(&slot.proxies, 0, vertices);
+            let queue = &self.stage.gpu.queue;
+            if self.pyramid.is_some() {
+                queue.write_buffer(&slot.proxies, 0, bytemuck::cast_slice(&self.asks));
+                encoder.clear_buffer(&slot.resolved, 0, None);
+            } else {
+                queue.write_buffer(&slot.proxies, 0, bytemuck::cast_slice(&self.proxy_vertices));
+            }
         }
         let (mut place, mut set) = (0, 0);
         while place < self.events.len() || !self.cleared {
+            if let (true, Some(Event::AskPyramid { .. }), Some(slot), Some(pyramid)) =
+                (self.cleared, self.events.get(place), &slot, &self.pyramid)
+            {
+                place = self.encode_pyramid(&mut encoder, slot, pyramid, place);
+                continue;
+            }
             let clear = !std::mem::replace(&mut self.cleared, true);
             // Draws after the last question of a full set go with the next pass, which may have none.
-            let with = slot.as_ref().filter(|_| set * QUERIES_PER_PASS < self.open.len());
+            let with = slot
+                .as_ref()
+                .filter(|_| self.pyramid.is_none() && set * QUERIES_PER_PASS < self.open.len());
             place = self.encode_pass(&mut encoder, with.map(|slot| (slot, set)), place, clear);
             set += 1;
         }
         if let Some(slot) = &slot {
-            let sets = self.open.len().div_ceil(QUERIES_PER_PASS);
-            let bytes = self.open.len() as u64 * RESULT_BYTES;
-            for set in 0..sets {
-                let count = (self.open.len() - set * QUERIES_PER_PASS).min(QUERIES_PER_PASS);
-                let offset = (set * QUERIES_PER_PASS) as u64 * RESULT_BYTES;
-                encoder.resolve_query_set(
-                    &slot.queries[set],
-                    0..count as u32,
-                    &slot.resolved,
-                    offset,
-                );
-            }
-            encoder.copy_buffer_to_buffer(&slot.resolved, 0, &slot.staging, 0, bytes);
+            self.encode_results(&mut encoder, slot);
         }
         let submission = self.stage.gpu.queue.submit([encoder.finish()]);
         let queries = std::mem::take(&mut self.open);
@@ -368,7 +479,9 @@ impl Oracle for Hardware {
         }
         self.events.clear();
         self.proxy_vertices.clear();
-        self.flights.push_back(Flight { slot, submission, queries });
+        self.asks.clear();
+        let unasked = std::mem::take(&mut self.unasked);
+        self.flights.push_back(Flight { slot, submission, queries, unasked });
         self.stage.gpu.healthy()
     }
 
@@ -383,11 +496,17 @@ impl Oracle for Hardware {
                 .slice(..bytes)
                 .get_mapped_range()
                 .map_err(|error| OracleError::Lost(error.to_string()))?;
-            let counts = mapped.chunks_exact(RESULT_BYTES as usize);
+            let first = answers.len();
+            // A query object leaves eight bytes, the pyramid four.
+            let wide = if self.pyramid.is_some() { 4 } else { RESULT_BYTES as usize };
+            let counts = mapped.chunks_exact(wide);
             answers.extend(flight.queries.iter().zip(counts).map(|(&query, count)| Answer {
                 query,
                 visible: count.iter().any(|&byte| byte != 0),
             }));
+            for place in flight.unasked {
+                answers[first + place as usize].visible = true;
+            }
         }
         slot.staging.unmap();
         self.free.push(slot);

@@ -8,8 +8,9 @@
 mod gpu;
 mod hardware;
 mod images;
+mod pyramid;
 mod stage;
 
 pub use gpu::{Gpu, NO_DEVICE};
-pub use hardware::{Hardware, QUERIES_PER_PASS};
+pub use hardware::{Hardware, QUERIES_PER_PASS, Questions};
 pub use stage::GpuStage;

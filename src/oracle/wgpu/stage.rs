@@ -6,6 +6,7 @@ use std::sync::Arc;
 use wgpu::util::DeviceExt;
 
 use super::gpu::Gpu;
+use super::pyramid;
 use crate::oracle::{OracleError, Stage};
 use crate::part::{ObjectId, PartedMesh};
 
@@ -47,6 +48,8 @@ pub struct GpuStage {
     pub(super) draw_ids: wgpu::RenderPipeline,
     /// Less or equal, writes nothing.
     pub(super) ask: wgpu::RenderPipeline,
+    /// Answers by maxima of depth.
+    pub(super) pyramid: pyramid::Pipelines,
 }
 
 impl GpuStage {
@@ -91,6 +94,7 @@ impl GpuStage {
             draw: pipelines.part(None),
             draw_ids: pipelines.part(Some(IDS)),
             ask: pipelines.proxy(),
+            pyramid: pyramid::Pipelines::new(device),
             layout,
         });
         gpu.wait(None)?;

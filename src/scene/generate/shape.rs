@@ -67,9 +67,92 @@ impl Builder {
         }
     }
 
+    /// A tube of `sides` flat sides round the polyline `points`, open at both ends. The rings are
+    /// carried along without twisting; points that coincide are passed over.
+    pub(super) fn tube(&mut self, points: &[DVec3], radius: f64, sides: u32) {
+        let mut rings: Vec<u32> = Vec::new();
+        let mut side = DVec3::ZERO;
+        for (place, &point) in points.iter().enumerate() {
+            let before = points[place.saturating_sub(1)];
+            let after = points[(place + 1).min(points.len() - 1)];
+            let Some(along) = (after - before).try_normalize() else { continue };
+            // The part of the last side that is still across; any perpendicular at the start.
+            side = (side - along * side.dot(along))
+                .try_normalize()
+                .unwrap_or_else(|| along.any_orthonormal_vector());
+            let up = along.cross(side);
+            rings.push(self.positions.len() as u32);
+            for corner in 0..sides {
+                let turn = std::f64::consts::TAU * f64::from(corner) / f64::from(sides);
+                let at = point + (side * cos(turn) + up * sin(turn)) * radius;
+                self.positions.push(at.as_vec3().to_array());
+            }
+        }
+        for pair in rings.windows(2) {
+            self.band(pair[0], pair[1], sides);
+        }
+    }
+
+    /// A body of revolution about the y axis through `origin`: `profile` lists (radius, height), and
+    /// a radius of zero closes an end.
+    pub(super) fn lathe(&mut self, origin: DVec3, profile: &[[f64; 2]], sides: u32) {
+        let first = self.positions.len() as u32;
+        for &[radius, height] in profile {
+            for corner in 0..sides {
+                let turn = std::f64::consts::TAU * f64::from(corner) / f64::from(sides);
+                let at = origin + DVec3::new(radius * cos(turn), height, radius * sin(turn));
+                self.positions.push(at.as_vec3().to_array());
+            }
+        }
+        for ring in 1..profile.len() as u32 {
+            self.band(first + (ring - 1) * sides, first + ring * sides, sides);
+        }
+    }
+
+    /// The triangles between two rings of vertices.
+    fn band(&mut self, low: u32, high: u32, sides: u32) {
+        for corner in 0..sides {
+            let next = (corner + 1) % sides;
+            let [a, b, c, d] = [low + corner, low + next, high + corner, high + next];
+            self.triangles.extend([[a, b, d], [a, d, c]]);
+        }
+    }
+
+    /// Turns what was built so far a quarter about the z axis, so that y becomes x.
+    pub(super) fn lay_along_x(&mut self) {
+        self.positions.iter_mut().for_each(|p| *p = [p[1], -p[0], p[2]]);
+    }
+
     pub(super) fn finish(self, name: &str) -> Mesh {
         Mesh::new(name, self.positions, self.triangles).expect("generated shapes are finite")
     }
+}
+
+/// The polyline with its corners rounded: each inner corner becomes `steps` chords of a curve that
+/// begins and ends `reach` away from it, or half way to its neighbour where that is nearer; straight
+/// runs are cut about every `cell` units.
+pub(super) fn rounded(corners: &[DVec3], reach: f64, steps: u32, cell: f64) -> Vec<DVec3> {
+    let mut points = vec![corners[0]];
+    let straight = |points: &mut Vec<DVec3>, to: DVec3| {
+        let from = points[points.len() - 1];
+        let cells = (from.distance(to) / cell).ceil().max(1.0) as u32;
+        points.extend((1..=cells).map(|i| from.lerp(to, f64::from(i) / f64::from(cells))));
+    };
+    for three in corners.windows(3) {
+        let [before, corner, after] = [three[0], three[1], three[2]];
+        let near = |end: DVec3| {
+            let whole = end - corner;
+            corner + whole * (reach / whole.length().max(reach)).min(0.5)
+        };
+        let (enter, leave) = (near(before), near(after));
+        straight(&mut points, enter);
+        points.extend((1..=steps).map(|i| {
+            let t = f64::from(i) / f64::from(steps);
+            enter.lerp(corner, t).lerp(corner.lerp(leave, t), t)
+        }));
+    }
+    straight(&mut points, corners[corners.len() - 1]);
+    points
 }
 
 /// A closed bumpy blob with concavities, of about `triangles` triangles (at least 32), within unit

@@ -1,0 +1,168 @@
+//! `compare`: cullers on the same frames, beside Table 1 and Figures 6 to 9 of the paper.
+
+use std::path::{Path, PathBuf};
+
+use super::args::{CompareArgs, SceneArgs};
+use super::run::{
+    Finished, Named, Oracles, Plan, catch_interrupt, pick_cost, pick_cullers, pick_index,
+    progress_bar, tell_failures,
+};
+use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use crate::cull::CullerKind;
+use crate::oracle::CostModel;
+use crate::report::{Comparison, picture_png};
+use crate::run::{Trace, depth_complexity};
+
+/// The scenes of the paper.
+const SCENES: [&str; 2] = ["powerplant", "bunnies"];
+/// Leaf sizes at full size: the paper's text has 23 parts a bunny, its table about 75.
+const FULL_LEAVES: [(&str, &[u32]); 2] = [("powerplant", &[3072]), ("bunnies", &[3072, 1600])];
+/// The cullers of the paper's table, and those a user would weigh against them.
+const CULLERS: [&str; 3] = ["full", "simple", "vfc"];
+
+/// One scene with one leaf size.
+struct Case {
+    named: Named,
+    args: SceneArgs,
+    label: String,
+}
+
+fn cases(args: &CompareArgs) -> Result<Vec<Case>, CliError> {
+    let names: Vec<&str> = if args.scene.is_empty() {
+        SCENES.to_vec()
+    } else {
+        args.scene.iter().map(String::as_str).collect()
+    };
+    let mut cases = Vec::new();
+    for name in names {
+        let known = FULL_LEAVES.iter().find(|(scene, _)| *scene == name);
+        let leaves = match known {
+            Some((_, leaves)) if args.scene_args.full_size && args.leaves.is_empty() => {
+                leaves.to_vec()
+            }
+            _ if args.leaves.is_empty() => vec![args.scene_args.leaf],
+            _ => args.leaves.clone(),
+        };
+        let alone = leaves.len() == 1;
+        for leaf in leaves {
+            let scene_args = SceneArgs { leaf, ..args.scene_args.clone() };
+            let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy();
+            let label = if alone { stem.into_owned() } else { format!("{stem}-{leaf}") };
+            cases.push(Case { named: Named::open(name, &scene_args)?, args: scene_args, label });
+        }
+    }
+    Ok(cases)
+}
+
+/// The folder, made if it is not there.
+fn folder(path: &Path) -> Result<PathBuf, CliError> {
+    std::fs::create_dir_all(path)
+        .map_err(|source| CliError::Write { path: path.display().to_string(), source })?;
+    Ok(path.to_owned())
+}
+
+pub(super) fn compare(
+    args: &CompareArgs,
+    cullers: &[CullerKind],
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
+    let names: Vec<String> = if args.culler.is_empty() {
+        CULLERS.map(str::to_owned).to_vec()
+    } else {
+        args.culler.clone()
+    };
+    let chosen = pick_cullers(&names, cullers)?;
+    let index = pick_index(&args.scene_args.index)?;
+    Oracles::known(&args.oracle)?;
+    let cost = pick_cost(&args.scene_args)?;
+    let cases = cases(args)?;
+    let out = folder(&args.out)?;
+    let adapter = args.scene_args.adapter.as_deref();
+    let oracles = Oracles::open(&args.oracle, adapter, streams)?;
+    let mut plan = Plan { cullers: chosen, index, oracles, cost, args: &args.scene_args };
+    catch_interrupt();
+    let bar = progress_bar();
+    let (mut failed, mut csv) = (false, String::new());
+    for case in &cases {
+        plan.args = &case.args;
+        let mut said = Ok(());
+        let finished = plan.run_after(&case.named, &bar, &mut |world| {
+            let state = crate::run::FrameState::at(world, world.scene.frames / 2);
+            let complexity = depth_complexity(world, &state);
+            let line = format!(
+                "{}: {} objects, {} moving, {} triangles, {} after the cut, {} parts (at most {} triangles each), {} frames; depth complexity {complexity:.1} in the middle frame; built in {:.1} s{}",
+                case.label,
+                world.partition.object_count(),
+                world.moving_count(),
+                world.scene.triangle_count(),
+                world.partition.fragment_count(),
+                world.partition.part_count(),
+                case.args.leaf,
+                world.scene.frames,
+                world.build_seconds,
+                peak_memory()
+            );
+            said = bar.suspend(|| writeln!(streams.out, "{line}"));
+        });
+        if finished.is_err() {
+            bar.finish_and_clear();
+        }
+        let finished = finished?;
+        said?;
+        failed |= tell_case(case, &finished, &plan.cost, (&out, &mut csv), streams, &bar)?;
+    }
+    bar.finish_and_clear();
+    OutFile::create(&out.join("series.csv"))?.finish(csv.as_bytes())?;
+    let word = if failed { "FAILED" } else { "held" };
+    writeln!(streams.out, "verdict: {word}; figures and series in {}", out.display())?;
+    Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
+}
+
+/// Tables, failures and figures of one case; whether anything failed.
+fn tell_case(
+    case: &Case,
+    finished: &Finished,
+    model: &CostModel,
+    (out, csv): (&Path, &mut String),
+    streams: &mut Streams<'_>,
+    bar: &indicatif::ProgressBar,
+) -> Result<bool, CliError> {
+    let mut failed = false;
+    for (trace, gate) in finished.traces.iter().zip(&finished.gates) {
+        failed |= !gate.held();
+        bar.suspend(|| tell_failures(gate, trace, streams))?;
+    }
+    let mut oracles: Vec<&str> = Vec::new();
+    for trace in &finished.traces {
+        if !oracles.contains(&trace.lane.oracle) {
+            oracles.push(trace.lane.oracle);
+        }
+    }
+    for oracle in &oracles {
+        let of: Vec<Trace> =
+            finished.traces.iter().filter(|t| t.lane.oracle == *oracle).cloned().collect();
+        let scene = &finished.world.scene.name;
+        let comparison = Comparison { scene, label: &case.label, traces: &of, model };
+        bar.suspend(|| writeln!(streams.out, "\non {oracle}:\n{}", comparison.table()))?;
+        // Series and figures of the device where there is one: the last oracle.
+        if oracles.last() == Some(oracle) {
+            let lines = comparison.csv();
+            let head = lines.find('\n').map_or(0, |end| end + 1);
+            *csv += if csv.is_empty() { &lines } else { &lines[head..] };
+            for (stem, chart) in comparison.charts() {
+                let path = |kind: &str| out.join(format!("{}-{stem}.{kind}", case.label));
+                OutFile::create(&path("svg"))?.finish(chart.svg().as_bytes())?;
+                OutFile::create(&path("png"))?.finish(&picture_png(&chart.png()))?;
+            }
+        }
+    }
+    Ok(failed)
+}
+
+/// The most memory the process has held so far, where the system tells.
+fn peak_memory() -> String {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
+    kib.map_or(String::new(), |kib| format!(", {} MiB at most so far", kib / 1024))
+}

@@ -1,0 +1,44 @@
+//! How recent answers postpone the next question: the curve of Figure 3 of Kovalčík & Sochor 2006, as
+//! named policies.
+
+/// When a node that was visible is asked about again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Postponement {
+    /// In every frame.
+    Never,
+    /// The more "visible" answers in a row, the more frames to wait. The paper draws the curve without
+    /// numbers; this one doubles and then grows by steps of two, up to eight frames.
+    #[default]
+    Figure3,
+    /// Steeper, up to sixteen frames: fewer questions, more drawn in vain.
+    Steep,
+}
+
+impl Postponement {
+    /// Frames to pass over before the next question, after `streak` "visible" answers in a row before
+    /// the present one.
+    #[must_use]
+    pub fn wait(self, streak: u8) -> u32 {
+        let curve: &[u32] = match self {
+            Self::Never => &[0],
+            Self::Figure3 => &[0, 1, 2, 4, 6, 8],
+            Self::Steep => &[1, 2, 4, 8, 12, 16],
+        };
+        curve[usize::from(streak).min(curve.len() - 1)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn longer_streaks_wait_no_less() {
+        for policy in [Postponement::Never, Postponement::Figure3, Postponement::Steep] {
+            let waits: Vec<u32> = (0..=u8::MAX).map(|streak| policy.wait(streak)).collect();
+            assert!(waits.is_sorted(), "{policy:?}");
+        }
+        assert_eq!(Postponement::Never.wait(200), 0);
+        assert_eq!((Postponement::Figure3.wait(0), Postponement::Figure3.wait(99)), (0, 8));
+    }
+}
