@@ -145,6 +145,9 @@ pub(super) struct CompareArgs {
     pub(super) leaves: Vec<u32>,
     #[command(flatten)]
     pub(super) scene_args: SceneArgs,
+    /// One JSON object a lane on standard output in place of the tables.
+    #[arg(long)]
+    pub(super) json: bool,
     /// Folder for the figures (SVG and PNG) and the series (CSV).
     #[arg(long, value_name = "FOLDER", default_value = "comparison")]
     pub(super) out: PathBuf,

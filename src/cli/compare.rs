@@ -102,19 +102,25 @@ pub(super) fn compare(
                 world.build_seconds,
                 peak_memory()
             );
-            said = bar.suspend(|| writeln!(streams.out, "{line}"));
+            // Before any culler is measured, so that nobody can have chosen it by the outcome.
+            let to = if args.json { &mut streams.talk } else { &mut streams.out };
+            said = bar.suspend(|| writeln!(to, "{line}"));
         });
         if finished.is_err() {
             bar.finish_and_clear();
+            // Takes away nothing but an empty folder.
+            let _ = std::fs::remove_dir(&out);
         }
         let finished = finished?;
         said?;
-        failed |= tell_case(case, &finished, &plan.cost, (&out, &mut csv), streams, &bar)?;
+        failed |=
+            tell_case(case, &finished, &plan.cost, (&out, &mut csv, args.json), streams, &bar)?;
     }
     bar.finish_and_clear();
     OutFile::create(&out.join("series.csv"))?.finish(csv.as_bytes())?;
     let word = if failed { "FAILED" } else { "held" };
-    writeln!(streams.out, "verdict: {word}; figures and series in {}", out.display())?;
+    let to = if args.json { &mut streams.talk } else { &mut streams.out };
+    writeln!(to, "verdict: {word}; figures and series in {}", out.display())?;
     Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
 }
 
@@ -123,7 +129,7 @@ fn tell_case(
     case: &Case,
     finished: &Finished,
     model: &CostModel,
-    (out, csv): (&Path, &mut String),
+    (out, csv, json): (&Path, &mut String, bool),
     streams: &mut Streams<'_>,
     bar: &indicatif::ProgressBar,
 ) -> Result<bool, CliError> {
@@ -143,7 +149,12 @@ fn tell_case(
             finished.traces.iter().filter(|t| t.lane.oracle == *oracle).cloned().collect();
         let scene = &finished.world.scene.name;
         let comparison = Comparison { scene, label: &case.label, traces: &of, model };
-        bar.suspend(|| writeln!(streams.out, "\non {oracle}:\n{}", comparison.table()))?;
+        let said = if json {
+            comparison.json_lines().join("\n")
+        } else {
+            format!("\non {oracle}:\n{}", comparison.table())
+        };
+        bar.suspend(|| writeln!(streams.out, "{said}"))?;
         // Series and figures of the device where there is one: the last oracle.
         if oracles.last() == Some(oracle) {
             let lines = comparison.csv();

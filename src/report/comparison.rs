@@ -1,6 +1,8 @@
 //! Table 1 and Figures 6 to 9 of Kovalčík & Sochor 2006, made from traces and set beside the paper's
 //! own figures.
 
+use serde_json::json;
+
 use super::chart::{Chart, Series};
 use crate::oracle::CostModel;
 use crate::run::{FrameTrace, Trace};
@@ -130,6 +132,40 @@ impl Comparison<'_> {
             );
         }
         text + &self.ratios()
+    }
+
+    /// One JSON object a lane: means per frame, beside the paper's where it has the row.
+    #[must_use]
+    pub fn json_lines(&self) -> Vec<String> {
+        let line = |trace: &Trace| {
+            let row = paper(self.scene, &trace.lane.culler);
+            let virtual_ms = |f: &FrameTrace| self.model.frame_total_ns(f.amounts()) as f64 / 1e6;
+            json!({
+                "schema": super::JSON_SCHEMA,
+                "scene": self.scene,
+                "label": self.label,
+                "culler": trace.lane.culler,
+                "oracle": trace.lane.oracle,
+                "device": trace.lane.device,
+                "frames": trace.frames.len(),
+                "wall_ms": mean(trace, wall_ms),
+                "cost_model": self.model.name,
+                "virtual_ms": mean(trace, virtual_ms),
+                "drawn_parts": mean(trace, |f| f64::from(f.drawn_parts)),
+                "drawn_triangles": mean(trace, |f| f.counts.triangles as f64),
+                "visible_parts": mean(trace, |f| f64::from(f.visible_parts)),
+                "visible_triangles": mean(trace, |f| f.visible_triangles as f64),
+                "queries": mean(trace, |f| f.counts.queries as f64),
+                "proxies": mean(trace, |f| f.counts.proxies as f64),
+                "round_trips": mean(trace, |f| f.counts.round_trips as f64),
+                "paper_ms": row.map(|r| r.ms),
+                "paper_parts": row.map(|r| r.parts),
+                "paper_queries": row.map(|r| r.queries),
+                "trace_hash": format!("{:016x}", trace.hash()),
+            })
+            .to_string()
+        };
+        self.traces.iter().map(line).collect()
     }
 
     /// What the paper's claims come down to, beside the paper's own.

@@ -138,3 +138,38 @@ fn list_and_help_are_results() {
     let (code, _, talk) = plainsight(&["rum"]);
     assert!(code == 2 && talk.contains("run"), "{talk}");
 }
+
+#[test]
+fn compare_sets_the_paper_beside_its_own_and_draws_the_figures() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("figures");
+    let args = |oracle: &'static str, more: &[&'static str]| {
+        let fixed = ["compare", "--scene", "bunnies", "--oracle", oracle, "--out"];
+        [&fixed[..], &[out.to_str().unwrap()], &SMALL, more]
+            .concat()
+            .iter()
+            .map(|&word| word.to_owned())
+            .collect::<Vec<String>>()
+    };
+    let call = |args: Vec<String>| plainsight(&args.iter().map(String::as_str).collect::<Vec<_>>());
+    let (code, said, talk) = call(args("sim", &[]));
+    assert_eq!(code, 0, "{talk}");
+    for words in ["depth complexity", "826", "14408", "ceiling", "simple ÷ full in queries"] {
+        assert!(said.contains(words), "{words} is missing in {said}");
+    }
+    for stem in ["time", "fps", "parts", "queries"] {
+        let svg = std::fs::read_to_string(out.join(format!("bunnies-{stem}.svg"))).unwrap();
+        assert!(svg.starts_with("<svg") && svg.contains("simple") && svg.ends_with("</svg>\n"));
+        let png = image::open(out.join(format!("bunnies-{stem}.png"))).unwrap();
+        assert!(png.width() >= 600);
+    }
+    let series = std::fs::read_to_string(out.join("series.csv")).unwrap();
+    assert_eq!(series.lines().count(), 1 + 3 * 3, "a head, three cullers, three frames");
+    let (code, said, _) = call(args("sim", &["--json", "--culler", "vfc"]));
+    let row: serde_json::Value = serde_json::from_str(said.trim()).unwrap();
+    assert_eq!((code, &row["paper_parts"]), (0, &22344.0.into()), "{row}");
+    let (code, _, talk) = call(args("sim", &["--cost", "nowhere.toml"]));
+    assert!(code == 2 && talk.contains("nowhere.toml"), "{talk}");
+    let (code, _, talk) = call(args("sim", &["--full-size"]));
+    assert!(code == 2 && talk.contains("--full-size"), "--scale excludes it: {talk}");
+}
