@@ -40,20 +40,6 @@ impl Chc {
         let scenery = Scenery::new(setup, SceneryKnobs { tighten: true, treeless_items: true });
         Self { scenery, visible_after: Vec::new(), opened: OpenedNodes::default() }
     }
-
-    fn open(
-        &mut self,
-        view: &View<'_>,
-        pen: &mut Pen<'_>,
-        (item, parent): (Item, usize),
-        stack: &mut Vec<(Item, usize)>,
-    ) -> usize {
-        let place = self.opened.push(item, parent);
-        let mut below = Vec::new();
-        self.scenery.expand(view, item, pen, &mut below);
-        stack.extend(below.into_iter().rev().map(|item| (item, place)));
-        place
-    }
 }
 
 impl Culler for Chc {
@@ -72,7 +58,8 @@ impl Culler for Chc {
                 match self.scenery.appearance(view, item) {
                     Appearance::Nowhere => {}
                     Appearance::Certain => {
-                        let place = self.open(view, pen, (item, parent), &mut stack);
+                        let place =
+                            self.opened.open(&self.scenery, view, pen, (item, parent), &mut stack);
                         if is_part {
                             self.opened.show(place);
                         }
@@ -82,7 +69,13 @@ impl Culler for Chc {
                         let was_visible = view.frame > 0 && visible_after == view.frame;
                         let mut place = parent;
                         if was_visible {
-                            place = self.open(view, pen, (item, parent), &mut stack);
+                            place = self.opened.open(
+                                &self.scenery,
+                                view,
+                                pen,
+                                (item, parent),
+                                &mut stack,
+                            );
                         }
                         if is_part || !was_visible {
                             pen.ask(&proxy);
@@ -106,7 +99,13 @@ impl Culler for Chc {
                 if node.was_visible {
                     self.opened.show(node.place);
                 } else {
-                    let place = self.open(view, pen, (node.item, node.place), &mut stack);
+                    let place = self.opened.open(
+                        &self.scenery,
+                        view,
+                        pen,
+                        (node.item, node.place),
+                        &mut stack,
+                    );
                     self.opened.show(place);
                 }
             }

@@ -68,20 +68,6 @@ impl ChcPlus {
         }
     }
 
-    fn open(
-        &mut self,
-        view: &View<'_>,
-        pen: &mut Pen<'_>,
-        (item, parent): (Item, usize),
-        stack: &mut Vec<(Item, usize)>,
-    ) -> usize {
-        let place = self.opened.push(item, parent);
-        let mut below = Vec::new();
-        self.scenery.expand(view, item, pen, &mut below);
-        stack.extend(below.into_iter().rev().map(|item| (item, place)));
-        place
-    }
-
     /// Asks about all that is queued, those together that will hardly show.
     fn ask_queued(&mut self, pen: &mut Pen<'_>) {
         let mut queued = std::mem::take(&mut self.queued);
@@ -127,7 +113,7 @@ impl ChcPlus {
                 }
             }
             Some(proxy) if self.scenery.is_part(item) => {
-                let place = self.open(view, pen, (item, parent), stack);
+                let place = self.opened.open(&self.scenery, view, pen, (item, parent), stack);
                 // A hash for the random phase; the node's number decides.
                 let phase = (slot as u32).wrapping_mul(2_654_435_769) >> 16;
                 if (view.frame + phase).is_multiple_of(ASSUMED_VISIBLE) {
@@ -137,7 +123,7 @@ impl ChcPlus {
                 }
             }
             _ => {
-                let place = self.open(view, pen, (item, parent), stack);
+                let place = self.opened.open(&self.scenery, view, pen, (item, parent), stack);
                 if self.scenery.is_part(item) {
                     self.opened.show(place);
                 }
@@ -161,7 +147,8 @@ impl ChcPlus {
             } else if visible && node.was_visible {
                 self.opened.show(node.place);
             } else if visible {
-                let place = self.open(view, pen, (node.item, node.place), stack);
+                let place =
+                    self.opened.open(&self.scenery, view, pen, (node.item, node.place), stack);
                 self.opened.show(place);
             } else {
                 let history = &mut self.history[slot];

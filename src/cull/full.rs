@@ -93,7 +93,6 @@ struct Frame {
     opened: OpenedNodes,
     candidates: Vec<Candidate>,
     due: Vec<Due>,
-    next: Vec<Item>,
     stack: Vec<(Item, usize)>,
 }
 
@@ -207,10 +206,8 @@ impl Full {
         parent: usize,
         shows: bool,
     ) -> usize {
-        let place = self.frame.opened.push(item, parent);
-        self.scenery.expand(view, item, pen, &mut self.frame.next);
-        let below = self.frame.next.drain(..).rev().map(|item| (item, place));
-        self.frame.stack.extend(below);
+        let Frame { opened, stack, .. } = &mut self.frame;
+        let place = opened.open(&self.scenery, view, pen, (item, parent), stack);
         if shows && self.scenery.is_part(item) {
             self.frame.opened.show(place);
         }

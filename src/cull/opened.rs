@@ -1,7 +1,7 @@
 //! The nodes that a frame's walk went into, with the way back up: *pull-up* of visibility (Bittner,
 //! Wimmer, Piringer & Purgathofer 2004, section 3.2). An inner node shows if anything below it does.
 
-use super::Item;
+use super::{Item, Pen, Scenery, View};
 
 /// The place above the root.
 pub(super) const NO_PARENT: usize = usize::MAX;
@@ -17,28 +17,49 @@ pub(super) struct Opened {
 
 /// All of them, in the order of the walk.
 #[derive(Debug, Default)]
-pub(super) struct OpenedNodes(Vec<Opened>);
+pub(super) struct OpenedNodes {
+    nodes: Vec<Opened>,
+    /// Room for a node's children.
+    below: Vec<Item>,
+}
 
 impl OpenedNodes {
     pub(super) fn clear(&mut self) {
-        self.0.clear();
+        self.nodes.clear();
     }
 
     /// Adds a node below the one at `parent`; returns its place.
-    pub(super) fn push(&mut self, item: Item, parent: usize) -> usize {
-        self.0.push(Opened { item, parent, shows: false });
-        self.0.len() - 1
+    fn push(&mut self, item: Item, parent: usize) -> usize {
+        self.nodes.push(Opened { item, parent, shows: false });
+        self.nodes.len() - 1
+    }
+
+    /// Walks into a node: draws its own part, or puts its children on the stack so that the nearest
+    /// comes off first. Returns the node's place.
+    pub(super) fn open(
+        &mut self,
+        scenery: &Scenery,
+        view: &View<'_>,
+        pen: &mut Pen<'_>,
+        (item, parent): (Item, usize),
+        stack: &mut Vec<(Item, usize)>,
+    ) -> usize {
+        let place = self.push(item, parent);
+        self.below.clear();
+        scenery.expand(view, item, pen, &mut self.below);
+        stack.extend(self.below.drain(..).rev().map(|item| (item, place)));
+        place
     }
 
     /// Notes that the node at `place`, and so all above it, shows.
     pub(super) fn show(&mut self, mut place: usize) {
-        while place != NO_PARENT && !self.0[place].shows {
-            self.0[place].shows = true;
-            place = self.0[place].parent;
+        while place != NO_PARENT && !self.nodes[place].shows {
+            self.nodes[place].shows = true;
+            place = self.nodes[place].parent;
         }
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = &Opened> {
-        self.0.iter()
+        self.nodes.iter()
     }
 }
