@@ -76,9 +76,9 @@ pub(super) fn compare(
     Oracles::known(&args.oracle)?;
     let cost = pick_cost(&args.scene_args)?;
     let cases = cases(args)?;
-    let out = folder(&args.out)?;
     let adapter = args.scene_args.adapter.as_deref();
     let oracles = Oracles::open(&args.oracle, adapter, streams)?;
+    let out = folder(&args.out)?;
     let mut plan = Plan { cullers: chosen, index, oracles, cost, args: &args.scene_args };
     catch_interrupt();
     let bar = progress_bar();

@@ -11,6 +11,7 @@
 //! the node's number, so that runs repeat.
 
 use super::opened::{NO_PARENT, OpenedNodes};
+use super::postponement::scatter;
 use super::scenery::Appearance;
 use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View, group};
 use crate::index::NodeId;
@@ -115,7 +116,7 @@ impl ChcPlus {
             Some(proxy) if self.scenery.is_part(item) => {
                 let place = self.opened.open(&self.scenery, view, pen, (item, parent), stack);
                 // A hash for the random phase; the node's number decides.
-                let phase = (slot as u32).wrapping_mul(2_654_435_769) >> 16;
+                let phase = scatter(slot) >> 16;
                 if (view.frame + phase).is_multiple_of(ASSUMED_VISIBLE) {
                     due.push(node(vec![proxy], place, 0.0));
                 } else {

@@ -4,8 +4,8 @@
 //! 1. The walk (Algorithms 2 and 4): front to back through both levels. A node takes the
 //!    `FirstVisibilityTest` (Algorithm 3): outside the frustum; certainly visible; visible last time,
 //!    so drawn at once; invisible last time, so a *candidate*.
-//! 2. One batch: everything drawn so far, then questions about all candidates, nearest first, then
-//!    about those drawn nodes whose next question is due by the postponement curve (Figure 3). A due
+//! 2. One batch: everything drawn so far, then questions about all candidates, the surest to be hidden
+//!    first and among equals the nearer, then about those drawn nodes whose next question is due by the postponement curve (Figure 3). A due
 //!    node was drawn and nobody waits: its answer counts from the next frame on.
 //! 3. Candidates that show are walked in turn, and make the next batch; at most
 //!    [`FullKnobs::most_in_flight`] questions a batch.
@@ -19,9 +19,11 @@
 //! Departures: the paper's rule that questions with overlapping rectangles wait for one another is not
 //! kept: what was visible last time is drawn before anything is asked, so the buffer is nearly whole,
 //! and a wrong "visible" costs less than a round trip. Objects without a tree are nodes of their own.
-//! It loses against `vfc` where little is hidden, unless adaptive.
+//! It loses against `vfc` where little is hidden, less so if adaptive; and without history, in a first
+//! frame or after a turn, it asks against a buffer that is nearly empty, and so more and in vain.
 
 use super::opened::{NO_PARENT, OpenedNodes};
+use super::postponement::scatter;
 use super::scenery::Appearance;
 use super::{Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, View, group};
 use crate::index::NodeId;
@@ -86,6 +88,10 @@ struct Due {
     /// Its own place in `opened`.
     place: usize,
 }
+
+/// The chance of being hidden that a due part is weighed with when a round trip is: even odds, since
+/// nothing was measured. It moves costs only, never a picture.
+const DUE_CHANCE: f64 = 0.5;
 
 /// What one frame has at hand.
 #[derive(Default)]
@@ -182,7 +188,7 @@ impl Full {
             .sum();
         // Due questions go along where something is asked, and are a good reason of their own once
         // they are many.
-        let due: f64 = self.frame.due.iter().map(|d| self.saving(model, 0.5, d.item)).sum();
+        let due: f64 = self.frame.due.iter().map(|d| self.saving(model, DUE_CHANCE, d.item)).sum();
         if saved + due > model.trip_ns {
             return true;
         }
@@ -220,7 +226,7 @@ impl Full {
         let history = &mut self.history[slot];
         let wait = self.knobs.postponement.wait(history.streak);
         // Nodes that came into view together are not all asked about in one frame again.
-        let spread = if wait > 1 { (slot as u32).wrapping_mul(SPREAD) % (wait / 2 + 1) } else { 0 };
+        let spread = if wait > 1 { scatter(slot) % (wait / 2 + 1) } else { 0 };
         history.visible_after = view.frame + 1;
         history.ask_from = view.frame + 1 + wait - spread;
         history.streak = history.streak.saturating_add(1);
@@ -342,9 +348,6 @@ enum Fate {
     /// Something in its group shows.
     Again,
 }
-
-/// An odd factor that scatters neighbouring slots (Knuth's multiplicative hashing).
-const SPREAD: u32 = 2_654_435_769;
 
 impl Culler for Full {
     fn name(&self) -> &str {

@@ -28,6 +28,12 @@ impl Postponement {
     }
 }
 
+/// A number that scatters neighbouring slots, so that nodes which came into view together are not all
+/// asked about together (Knuth's multiplicative hashing).
+pub(super) fn scatter(slot: usize) -> u32 {
+    (slot as u32).wrapping_mul(2_654_435_769)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -37,7 +37,9 @@ fn pairings() -> Vec<(IndexKind, &'static str, ProxyKind)> {
     pairings
 }
 
-/// What the paper's figures show, as an order: `simple` asks more than `full`, `vfc` nothing; `full`
+/// What the paper's figures show, as an order, on a path sampled as finely as the paper's (over a few
+/// frames of long steps `full` has no history to go by, and asks more than `simple` in the city; see
+/// the snapshot of counts): `simple` asks more than `full`, `vfc` nothing; `full`
 /// draws no more than `vfc`, `draw-all` everything.
 #[test]
 fn cullers_spend_in_the_papers_order() {
