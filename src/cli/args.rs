@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use plainsight_reference::fast::{Options, SimdLevel};
 
 use crate::cull::ProxyKind;
+use crate::oracle::{MIB, MemoryKnobs};
 use crate::part::{Crossing, PartitionKnobs};
 use crate::scene::Viewport;
 use crate::scene::generate::{CameraMode, Knobs};
@@ -93,6 +94,12 @@ pub(super) struct SceneArgs {
     /// file.
     #[arg(long, value_name = "NAME|FILE.toml", default_value = "lavapipe")]
     pub(super) cost: String,
+    /// Out of core: the MiB of geometry that each lane's device may hold (default: all of it).
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) memory: Option<u32>,
+    /// Out of core: the MiB that may be loaded ahead of each frame; 0 loads nothing ahead.
+    #[arg(long, value_name = "MIB", requires = "memory")]
+    pub(super) prefetch: Option<u32>,
     /// Vector instructions of the reference renderer (default: the widest of this machine). No
     /// result depends on it.
     #[arg(long, value_name = "LEVEL", value_parser = simd)]
@@ -281,6 +288,15 @@ impl SceneArgs {
         }
     }
 
+    /// The memory of each lane's device.
+    pub(super) fn memory(&self) -> Option<MemoryKnobs> {
+        let bytes = |mib: u32| u64::from(mib) * MIB;
+        self.memory.map(|budget| MemoryKnobs {
+            budget_bytes: bytes(budget),
+            prefetch_bytes: self.prefetch.map_or(MemoryKnobs::PREFETCH_BYTES, bytes),
+        })
+    }
+
     /// As the generators take them.
     pub(super) fn knobs(&self) -> Knobs {
         Knobs {
@@ -315,6 +331,8 @@ impl SceneArgs {
         add("parts", (self.parts == PartsArg::Whole).then(|| "whole".to_owned()));
         add("index", (self.index != "two-level-bsp").then(|| self.index.clone()));
         add("proxy", (self.proxy == ProxyArg::Box).then(|| "box".to_owned()));
+        add("memory", self.memory.map(|mib| mib.to_string()));
+        add("prefetch", self.prefetch.map(|mib| mib.to_string()));
         add("cost", (self.cost != "lavapipe").then(|| self.cost.clone()));
         add("adapter", self.adapter.clone());
         flags

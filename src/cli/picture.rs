@@ -40,7 +40,7 @@ pub(super) fn picture(
     let lane = (args.scene.as_str(), &args.culler, &args.oracle);
     let (plan, named) = one_lane(lane, &scene_args, cullers, streams)?;
     catch_interrupt();
-    let world = named.world(&scene_args);
+    let world = named.world(&scene_args)?;
     let state = FrameState::at(&world, args.frame);
     let truth = Truth::of(&world, &state);
     let drawn: Vec<PartId> = if needs_culler {

@@ -158,9 +158,15 @@ impl Named {
     }
 
     /// The scene cut into parts.
-    pub(super) fn world(&self, args: &SceneArgs) -> World {
-        let knobs = args.partition();
-        World::new(self.scene.clone(), knobs).rendered(args.render())
+    ///
+    /// # Errors
+    /// Where a device of `--memory` could not hold some mesh.
+    pub(super) fn world(&self, args: &SceneArgs) -> Result<World, CliError> {
+        let world = World::new(self.scene.clone(), args.partition()).rendered(args.render());
+        let Some(memory) = args.memory() else { return Ok(world) };
+        world
+            .within(memory)
+            .map_err(|error| CliError::Usage(format!("--memory, {}: {error}", self.name)))
     }
 }
 
@@ -209,7 +215,7 @@ impl Plan<'_> {
     ) -> Result<Finished, CliError> {
         let name = &named.name;
         bar.set_message(format!("{name}: building"));
-        let world = named.world(self.args);
+        let world = named.world(self.args)?;
         built(&world);
         let frames = world.scene.frames;
         let stage = world.stage();

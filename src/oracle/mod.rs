@@ -11,6 +11,7 @@
 mod always;
 mod cost;
 mod proxy_mesh;
+mod residency;
 mod sim;
 #[cfg_attr(not(feature = "hardware"), path = "no_wgpu.rs")]
 pub mod wgpu;
@@ -26,6 +27,7 @@ pub use always::Always;
 pub use cost::{Amounts, CostModel};
 #[cfg(feature = "hardware")]
 use proxy_mesh::box_proxy_triangles;
+pub use residency::{Memory, MemoryKnobs, Residency, Step, least_budget, mesh_bytes};
 pub use sim::{Sim, part_draw, part_instance};
 
 /// What an oracle is told at the start of a frame.
@@ -92,15 +94,20 @@ pub struct Stage {
     pub viewport: Viewport,
     /// How an oracle that is a reference renderer draws; no answer depends on it.
     pub render: Options,
+    /// The memory that each oracle's device has for meshes; `None` holds all of them.
+    pub memory: Option<MemoryKnobs>,
 }
 
 impl Stage {
-    /// Drawn in the default way.
+    /// Drawn in the default way, with memory for everything.
     #[must_use]
     pub fn new(partition: Arc<Partition>, viewport: Viewport) -> Self {
-        Self { partition, viewport, render: Options::default() }
+        Self { partition, viewport, render: Options::default(), memory: None }
     }
 }
+
+/// Bytes of a MiB.
+pub const MIB: u64 = 1 << 20;
 
 /// Why an oracle could not go on.
 #[derive(Debug, thiserror::Error)]
@@ -112,6 +119,18 @@ pub enum OracleError {
     /// The device went away or refused in the middle of a run.
     #[error("device lost: {0}")]
     Lost(String),
+    /// A mesh does not fit the memory that devices are given.
+    #[error(
+        "{:.2} MiB of device memory do not hold the largest mesh: give at least {}",
+        *budget as f64 / MIB as f64,
+        least.div_ceil(MIB)
+    )]
+    Budget {
+        /// Bytes given.
+        budget: u64,
+        /// Bytes of the largest mesh.
+        least: u64,
+    },
 }
 
 /// Answers visibility questions about a frame while it is being drawn.
@@ -121,6 +140,11 @@ pub trait Oracle {
 
     /// The adapter's name where a real device draws.
     fn device(&self) -> Option<String> {
+        None
+    }
+
+    /// What the frame so far meant for the device's memory, where that is limited.
+    fn memory(&self) -> Option<Memory> {
         None
     }
 

@@ -7,7 +7,9 @@ use plainsight_reference::fast::Instance;
 use plainsight_reference::{Draw, Faces, Image, fast};
 
 use super::proxy_mesh::box_triangles;
-use super::{Answer, FrameView, Oracle, OracleError, Proxy, QueryId, ReadBack, Stage};
+use super::{
+    Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Residency, Stage,
+};
 use crate::part::{PartId, Partition};
 
 /// The reference z-buffer as an oracle.
@@ -19,6 +21,8 @@ pub struct Sim {
     asked: u32,
     open: Vec<Answer>,
     submitted: VecDeque<Vec<Answer>>,
+    /// Where memory is limited: what a device would hold.
+    residency: Option<Residency>,
 }
 
 /// What the naive renderer needs of one part.
@@ -59,9 +63,13 @@ pub fn part_instance<'a>(
 
 impl Sim {
     /// An image of its own over the stage.
+    ///
+    /// # Panics
+    /// Where the stage has not enough memory for its largest mesh.
     #[must_use]
     pub fn new(stage: Stage) -> Self {
         let image = Image::new(stage.viewport);
+        let residency = stage.memory.map(|knobs| Residency::new(&stage.partition, knobs));
         Self {
             stage,
             image,
@@ -70,6 +78,7 @@ impl Sim {
             asked: 0,
             open: Vec::new(),
             submitted: VecDeque::new(),
+            residency,
         }
     }
 
@@ -89,6 +98,10 @@ impl Oracle for Sim {
         "sim"
     }
 
+    fn memory(&self) -> Option<Memory> {
+        self.residency.as_ref().map(Residency::counts)
+    }
+
     fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {
         self.image.clear();
         self.matrices.clear();
@@ -97,10 +110,17 @@ impl Oracle for Sim {
         self.asked = 0;
         self.open.clear();
         self.submitted.clear();
+        if let Some(residency) = &mut self.residency {
+            residency.begin_frame(view, &mut Vec::new());
+        }
         Ok(())
     }
 
     fn draw_part(&mut self, part: PartId) {
+        if let Some(residency) = &mut self.residency {
+            let (object, _) = self.stage.partition.locate(part);
+            residency.need(self.stage.partition.mesh_index(object), &mut Vec::new());
+        }
         self.waiting.push(part);
     }
 

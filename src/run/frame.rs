@@ -10,7 +10,7 @@ use crate::cull::{ObjectView, View};
 use crate::effect;
 use crate::index::{Entry, Move};
 use crate::math::{ClipError, rounded_clip_matrix};
-use crate::oracle::Stage;
+use crate::oracle::{MemoryKnobs, OracleError, Stage, least_budget};
 use crate::part::{ObjectId, Partition, PartitionKnobs};
 use crate::scene::{Camera, Scene};
 
@@ -22,6 +22,8 @@ pub struct World {
     pub partition: Arc<Partition>,
     /// How the reference draws; nothing that is compared depends on it.
     pub render: Options,
+    /// The memory that each lane's device has for meshes; `None` holds all of them.
+    pub memory: Option<MemoryKnobs>,
     /// Wall time that cutting the meshes took, seconds; a figure for reports.
     pub build_seconds: f64,
     effects: effect::World,
@@ -37,13 +39,25 @@ impl World {
         let partition = Arc::new(Partition::new(&scene, knobs));
         let build_seconds = start.elapsed().as_secs_f64();
         let effects = effect::World::new(&scene);
-        Self { scene, partition, render: Options::default(), build_seconds, effects }
+        Self { scene, partition, render: Options::default(), memory: None, build_seconds, effects }
     }
 
     /// The same, with the reference drawing in another way.
     #[must_use]
     pub fn rendered(self, render: Options) -> Self {
         Self { render, ..self }
+    }
+
+    /// The same, out of core: devices hold no more geometry than this.
+    ///
+    /// # Errors
+    /// [`OracleError::Budget`] where some mesh alone is larger.
+    pub fn within(self, memory: MemoryKnobs) -> Result<Self, OracleError> {
+        let (budget, least) = (memory.budget_bytes, least_budget(&self.partition));
+        if budget < least {
+            return Err(OracleError::Budget { budget, least });
+        }
+        Ok(Self { memory: Some(memory), ..self })
     }
 
     /// How many objects some effect moves.
@@ -56,7 +70,7 @@ impl World {
     #[must_use]
     pub fn stage(&self) -> Stage {
         let (partition, viewport) = (self.partition.clone(), self.scene.viewport);
-        Stage { partition, viewport, render: self.render }
+        Stage { partition, viewport, render: self.render, memory: self.memory }
     }
 
     /// What an index is built from: the boxes of frame 0.

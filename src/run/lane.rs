@@ -125,6 +125,7 @@ fn shoot(
     {
         panic!("{} broke its invariants in frame {}: {broken}", culler.name(), state.frame);
     }
+    let memory = oracle.memory();
     let own = oracle.read_back()?;
     let words = |image: &ReadBack| {
         image.depth.iter().fold(HASH_START, |hash, depth| fold(hash, u64::from(depth.to_bits())))
@@ -137,6 +138,7 @@ fn shoot(
         visible_parts,
         visible_triangles,
         counts,
+        memory,
         events_hash,
         truth_hash,
         image_hash,

@@ -2,7 +2,7 @@
 
 use super::{FrameState, HASH_START, LaneInfo, Truth, World, fold};
 use crate::cull::Counts;
-use crate::oracle::{Amounts, ReadBack};
+use crate::oracle::{Amounts, Memory, ReadBack};
 use crate::part::PartId;
 
 /// What a real device drew in one frame.
@@ -46,6 +46,8 @@ pub struct FrameTrace {
     pub visible_triangles: u64,
     /// Questions, answers, round trips.
     pub counts: Counts,
+    /// Memory traffic of the device, where its memory is limited.
+    pub memory: Option<Memory>,
     /// Hash of every draw, question and answer in order.
     pub events_hash: u64,
     /// Hash of the truth's image.
@@ -95,6 +97,7 @@ impl FrameTrace {
     /// Adds what must repeat of this frame to `hash`.
     #[must_use]
     pub fn fold_into(&self, hash: u64) -> u64 {
+        let memory = self.memory.iter().flat_map(Memory::words);
         [
             u64::from(self.frame),
             u64::from(self.drawn_parts),
@@ -106,6 +109,7 @@ impl FrameTrace {
             self.image_hash,
         ]
         .into_iter()
+        .chain(memory)
         .fold(hash, fold)
     }
 }

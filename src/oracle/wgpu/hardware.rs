@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use super::images::Images;
 use super::pyramid::{Ask, Pyramid};
-use super::stage::GpuStage;
+use super::stage::{GpuParts, GpuStage};
 use crate::oracle::{
-    Answer, FrameView, Oracle, OracleError, Proxy, QueryId, ReadBack, box_proxy_triangles,
+    Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Residency, Step,
+    box_proxy_triangles,
 };
 use crate::part::{ObjectId, PartId};
 use crate::scene::Viewport;
@@ -87,6 +88,19 @@ struct Flight {
     queries: Vec<QueryId>,
     /// Places in `queries` that are visible whatever the device says.
     unasked: Vec<u32>,
+    /// Whether the batch goes on in the next flight.
+    more: bool,
+}
+
+/// The meshes of a device with limited memory.
+struct Limited {
+    residency: Residency,
+    /// By mesh; what the books call resident.
+    meshes: Vec<Option<GpuParts>>,
+    /// Meshes that draws on their way to the device use.
+    in_use: Vec<bool>,
+    /// What went wrong while drawing, told by the next submit.
+    failed: Option<OracleError>,
 }
 
 /// Occlusion queries of a Vulkan device.
@@ -108,6 +122,7 @@ pub struct Hardware {
     unasked: Vec<u32>,
     flights: VecDeque<Flight>,
     free: Vec<Slot>,
+    limited: Option<Limited>,
 }
 
 impl Hardware {
@@ -115,6 +130,9 @@ impl Hardware {
     ///
     /// # Errors
     /// [`OracleError::Lost`] where the device refuses.
+    ///
+    /// # Panics
+    /// Where the stage has not enough memory for its largest mesh.
     pub fn new(stage: &Arc<GpuStage>, questions: Questions) -> Result<Self, OracleError> {
         let device = &stage.gpu.device;
         let objects = u64::from(stage.stage.partition.object_count().max(1));
@@ -135,6 +153,13 @@ impl Hardware {
         let images = Images::new(&stage.gpu, stage.stage.viewport, false);
         let pyramid = (questions == Questions::Pyramid)
             .then(|| Pyramid::new(&stage.gpu, stage.stage.viewport));
+        let limited = stage.stage.memory.map(|knobs| {
+            let partition = &stage.stage.partition;
+            let count = partition.meshes().len();
+            let residency = Residency::new(partition, knobs);
+            let meshes = (0..count).map(|_| None).collect();
+            Limited { residency, meshes, in_use: vec![false; count], failed: None }
+        });
         stage.gpu.healthy()?;
         Ok(Self {
             stage: Arc::clone(stage),
@@ -152,11 +177,142 @@ impl Hardware {
             unasked: Vec::new(),
             flights: VecDeque::new(),
             free: Vec::new(),
+            limited,
         })
     }
 
     fn encoder(&self) -> wgpu::CommandEncoder {
         self.stage.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    }
+
+    /// The buffers that parts of a mesh are drawn from.
+    fn parts(&self, mesh: u32) -> &GpuParts {
+        match &self.limited {
+            None => &self.stage.meshes[mesh as usize].parts,
+            Some(limited) => {
+                limited.meshes[mesh as usize].as_ref().expect("what is drawn was loaded")
+            }
+        }
+    }
+
+    /// Sees to it that a mesh is resident before it is drawn.
+    fn need(&mut self, mesh: u32) -> Result<(), OracleError> {
+        let Some(limited) = &mut self.limited else { return Ok(()) };
+        let mut steps = Vec::new();
+        limited.residency.need(mesh, &mut steps);
+        self.carry_out(&steps)?;
+        // Only now: what had to be drawn first did not use it.
+        if let Some(limited) = &mut self.limited {
+            limited.in_use[mesh as usize] = true;
+        }
+        Ok(())
+    }
+
+    /// Throws meshes out and loads others. What is still to be drawn with the former is drawn first.
+    fn carry_out(&mut self, steps: &[Step]) -> Result<(), OracleError> {
+        for step in steps {
+            let Some(limited) = &mut self.limited else { break };
+            match *step {
+                Step::Evict(mesh) if limited.in_use[mesh as usize] => {
+                    self.flush(true)?;
+                    let submission = self.flights.back().map(|flight| flight.submission.clone());
+                    self.stage.gpu.wait(submission)?;
+                    self.throw_out(mesh);
+                }
+                Step::Evict(mesh) => self.throw_out(mesh),
+                Step::Load(mesh) => {
+                    let partition = &self.stage.stage.partition;
+                    let parts = &partition.meshes()[mesh as usize];
+                    let loaded = GpuParts::new(&self.stage.gpu.device, parts);
+                    limited.meshes[mesh as usize] = Some(loaded);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn throw_out(&mut self, mesh: u32) {
+        let Some(limited) = &mut self.limited else { return };
+        if let Some(parts) = limited.meshes[mesh as usize].take() {
+            parts.destroy();
+        }
+    }
+
+    /// Sends everything since the last flush to the device. `more`: the batch is not yet ended.
+    fn flush(&mut self, more: bool) -> Result<(), OracleError> {
+        let mut encoder = self.encoder();
+        let slot = (!self.open.is_empty()).then(|| self.slot());
+        if let Some(slot) = &slot {
+            let queue = &self.stage.gpu.queue;
+            if self.pyramid.is_some() {
+                queue.write_buffer(&slot.proxies, 0, bytemuck::cast_slice(&self.asks));
+                encoder.clear_buffer(&slot.resolved, 0, None);
+            } else {
+                queue.write_buffer(&slot.proxies, 0, bytemuck::cast_slice(&self.proxy_vertices));
+            }
+        }
+        let (mut place, mut set) = (0, 0);
+        while place < self.events.len() || !self.cleared {
+            if let (true, Some(Event::AskPyramid { .. }), Some(slot), Some(pyramid)) =
+                (self.cleared, self.events.get(place), &slot, &self.pyramid)
+            {
+                place = self.encode_pyramid(&mut encoder, slot, pyramid, place);
+                continue;
+            }
+            let clear = !std::mem::replace(&mut self.cleared, true);
+            // Draws after the last question of a full set go with the next pass, which may have none.
+            let with = slot
+                .as_ref()
+                .filter(|_| self.pyramid.is_none() && set * QUERIES_PER_PASS < self.open.len());
+            place = self.encode_pass(&mut encoder, with.map(|slot| (slot, set)), place, clear);
+            set += 1;
+        }
+        if let Some(slot) = &slot {
+            self.encode_results(&mut encoder, slot);
+        }
+        let submission = self.stage.gpu.queue.submit([encoder.finish()]);
+        let queries = std::mem::take(&mut self.open);
+        if let Some(slot) = &slot {
+            let bytes = queries.len() as u64 * RESULT_BYTES;
+            slot.staging.slice(..bytes).map_async(wgpu::MapMode::Read, |_| {});
+        }
+        self.events.clear();
+        self.proxy_vertices.clear();
+        self.asks.clear();
+        let unasked = std::mem::take(&mut self.unasked);
+        self.flights.push_back(Flight { slot, submission, queries, unasked, more });
+        if let Some(limited) = &mut self.limited {
+            limited.in_use.fill(false);
+        }
+        self.stage.gpu.healthy()
+    }
+
+    /// Waits for a flight and appends its answers.
+    fn land(&mut self, flight: Flight, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
+        self.stage.gpu.wait(Some(flight.submission))?;
+        let Some(slot) = flight.slot else { return Ok(()) };
+        {
+            let bytes = flight.queries.len() as u64 * RESULT_BYTES;
+            let mapped = slot
+                .staging
+                .slice(..bytes)
+                .get_mapped_range()
+                .map_err(|error| OracleError::Lost(error.to_string()))?;
+            let first = answers.len();
+            // A query object leaves eight bytes, the pyramid four.
+            let wide = if self.pyramid.is_some() { 4 } else { RESULT_BYTES as usize };
+            let counts = mapped.chunks_exact(wide);
+            answers.extend(flight.queries.iter().zip(counts).map(|(&query, count)| Answer {
+                query,
+                visible: count.iter().any(|&byte| byte != 0),
+            }));
+            for place in flight.unasked {
+                answers[first + place as usize].visible = true;
+            }
+        }
+        slot.staging.unmap();
+        self.free.push(slot);
+        Ok(())
     }
 
     /// The next question's number.
@@ -275,7 +431,7 @@ impl Hardware {
                     let (object, local) = partition.locate(part);
                     let number = partition.mesh_index(object);
                     if drawing != Some(number) {
-                        let mesh = &self.stage.meshes[number as usize];
+                        let mesh = self.parts(number);
                         pass.set_pipeline(&self.stage.draw);
                         pass.set_vertex_buffer(0, mesh.vertices.slice(..));
                         pass.set_index_buffer(mesh.by_part.slice(..), wgpu::IndexFormat::Uint32);
@@ -358,7 +514,7 @@ impl Hardware {
         pass.set_bind_group(0, &self.bindings, &[]);
         for (object, run, whole) in runs {
             let mesh = &self.stage.meshes[partition.mesh_index(object) as usize];
-            pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+            pass.set_vertex_buffer(0, mesh.parts.vertices.slice(..));
             let from = if whole { &mesh.by_rank } else { &indices };
             pass.set_index_buffer(from.slice(..), wgpu::IndexFormat::Uint32);
             pass.draw_indexed(run, 0, object.0..object.0 + 1);
@@ -399,9 +555,19 @@ impl Oracle for Hardware {
         Some(self.stage.gpu.name().to_owned())
     }
 
+    fn memory(&self) -> Option<Memory> {
+        self.limited.as_ref().map(|limited| limited.residency.counts())
+    }
+
     fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {
         while !self.flights.is_empty() {
             self.collect(&mut Vec::new())?;
+        }
+        if let Some(limited) = &mut self.limited {
+            let mut steps = Vec::new();
+            limited.in_use.fill(false);
+            limited.residency.begin_frame(view, &mut steps);
+            self.carry_out(&steps)?;
         }
         let matrices = bytemuck::cast_slice(view.clip_from_object);
         self.stage.gpu.queue.write_buffer(&self.matrices, 0, matrices);
@@ -416,6 +582,15 @@ impl Oracle for Hardware {
     }
 
     fn draw_part(&mut self, part: PartId) {
+        let partition = &self.stage.stage.partition;
+        let mesh = partition.mesh_index(partition.locate(part).0);
+        if let Err(error) = self.need(mesh)
+            && let Some(limited) = &mut self.limited
+        {
+            // Nothing is encoded for a mesh that could not be loaded.
+            limited.failed.get_or_insert(error);
+            return;
+        }
         self.events.push(Event::Draw(part));
     }
 
@@ -441,75 +616,20 @@ impl Oracle for Hardware {
     }
 
     fn submit(&mut self) -> Result<(), OracleError> {
-        let mut encoder = self.encoder();
-        let slot = (!self.open.is_empty()).then(|| self.slot());
-        if let Some(slot) = &slot {
-            let queue = &self.stage.gpu.queue;
-            if self.pyramid.is_some() {
-                queue.write_buffer(&slot.proxies, 0, bytemuck::cast_slice(&self.asks));
-                encoder.clear_buffer(&slot.resolved, 0, None);
-            } else {
-                queue.write_buffer(&slot.proxies, 0, bytemuck::cast_slice(&self.proxy_vertices));
-            }
+        if let Some(error) = self.limited.as_mut().and_then(|limited| limited.failed.take()) {
+            return Err(error);
         }
-        let (mut place, mut set) = (0, 0);
-        while place < self.events.len() || !self.cleared {
-            if let (true, Some(Event::AskPyramid { .. }), Some(slot), Some(pyramid)) =
-                (self.cleared, self.events.get(place), &slot, &self.pyramid)
-            {
-                place = self.encode_pyramid(&mut encoder, slot, pyramid, place);
-                continue;
-            }
-            let clear = !std::mem::replace(&mut self.cleared, true);
-            // Draws after the last question of a full set go with the next pass, which may have none.
-            let with = slot
-                .as_ref()
-                .filter(|_| self.pyramid.is_none() && set * QUERIES_PER_PASS < self.open.len());
-            place = self.encode_pass(&mut encoder, with.map(|slot| (slot, set)), place, clear);
-            set += 1;
-        }
-        if let Some(slot) = &slot {
-            self.encode_results(&mut encoder, slot);
-        }
-        let submission = self.stage.gpu.queue.submit([encoder.finish()]);
-        let queries = std::mem::take(&mut self.open);
-        if let Some(slot) = &slot {
-            let bytes = queries.len() as u64 * RESULT_BYTES;
-            slot.staging.slice(..bytes).map_async(wgpu::MapMode::Read, |_| {});
-        }
-        self.events.clear();
-        self.proxy_vertices.clear();
-        self.asks.clear();
-        let unasked = std::mem::take(&mut self.unasked);
-        self.flights.push_back(Flight { slot, submission, queries, unasked });
-        self.stage.gpu.healthy()
+        self.flush(false)
     }
 
     fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
-        let Some(flight) = self.flights.pop_front() else { return Ok(()) };
-        self.stage.gpu.wait(Some(flight.submission))?;
-        let Some(slot) = flight.slot else { return Ok(()) };
-        {
-            let bytes = flight.queries.len() as u64 * RESULT_BYTES;
-            let mapped = slot
-                .staging
-                .slice(..bytes)
-                .get_mapped_range()
-                .map_err(|error| OracleError::Lost(error.to_string()))?;
-            let first = answers.len();
-            // A query object leaves eight bytes, the pyramid four.
-            let wide = if self.pyramid.is_some() { 4 } else { RESULT_BYTES as usize };
-            let counts = mapped.chunks_exact(wide);
-            answers.extend(flight.queries.iter().zip(counts).map(|(&query, count)| Answer {
-                query,
-                visible: count.iter().any(|&byte| byte != 0),
-            }));
-            for place in flight.unasked {
-                answers[first + place as usize].visible = true;
+        while let Some(flight) = self.flights.pop_front() {
+            let more = flight.more;
+            self.land(flight, answers)?;
+            if !more {
+                break;
             }
         }
-        slot.staging.unmap();
-        self.free.push(slot);
         Ok(())
     }
 

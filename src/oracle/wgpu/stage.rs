@@ -24,15 +24,42 @@ struct Vertex {
     part: u32,
 }
 
-/// One mesh on the device.
-pub(super) struct GpuMesh {
+/// What drawing the parts of a mesh takes.
+pub(super) struct GpuParts {
     pub(super) vertices: wgpu::Buffer,
     /// Grouped by part, counted from the part's first vertex.
     pub(super) by_part: wgpu::Buffer,
+}
+
+/// One mesh on the device.
+pub(super) struct GpuMesh {
+    pub(super) parts: GpuParts,
     /// In the order of ranks, counted from the mesh's first vertex.
     pub(super) by_rank: wgpu::Buffer,
     /// The same on this side, to pick parts from.
     pub(super) ranked: Vec<[u32; 3]>,
+}
+
+impl GpuParts {
+    /// Uploads them; as many bytes as `mesh_bytes` says.
+    pub(super) fn new(device: &wgpu::Device, mesh: &PartedMesh) -> Self {
+        let mut vertices = Vec::with_capacity(mesh.positions.len());
+        for (number, part) in mesh.parts.iter().enumerate() {
+            let of = |&position: &[f32; 3]| Vertex { position, part: number as u32 };
+            vertices.extend(mesh.positions_of(part).iter().map(of));
+        }
+        let (points, corners) = (wgpu::BufferUsages::VERTEX, wgpu::BufferUsages::INDEX);
+        Self {
+            vertices: buffer(device, bytemuck::cast_slice(&vertices), points),
+            by_part: buffer(device, bytemuck::cast_slice(&mesh.triangles), corners),
+        }
+    }
+
+    /// Gives the memory back at once; nothing on its way may use it.
+    pub(super) fn destroy(&self) {
+        self.vertices.destroy();
+        self.by_part.destroy();
+    }
 }
 
 /// Geometry and pipelines of one scene.
@@ -109,24 +136,16 @@ fn buffer(device: &wgpu::Device, contents: &[u8], usage: wgpu::BufferUsages) -> 
 }
 
 fn upload(device: &wgpu::Device, mesh: &PartedMesh) -> GpuMesh {
-    let mut vertices = Vec::with_capacity(mesh.positions.len());
     let mut absolute = Vec::with_capacity(mesh.triangles.len());
-    for (number, part) in mesh.parts.iter().enumerate() {
-        let run = part.first_vertex as usize..(part.first_vertex + part.vertex_count) as usize;
-        let of = |&position: &[f32; 3]| Vertex { position, part: number as u32 };
-        vertices.extend(mesh.positions[run].iter().map(of));
-        let run =
-            part.first_triangle as usize..(part.first_triangle + part.triangle_count) as usize;
+    for part in &mesh.parts {
         let from_first = |t: &[u32; 3]| t.map(|corner| corner + part.first_vertex);
-        absolute.extend(mesh.triangles[run].iter().map(from_first));
+        absolute.extend(mesh.triangles_of(part).0.iter().map(from_first));
     }
     let ranked: Vec<[u32; 3]> =
         mesh.triangle_of_rank.iter().map(|&place| absolute[place as usize]).collect();
-    let index = wgpu::BufferUsages::INDEX;
     GpuMesh {
-        vertices: buffer(device, bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
-        by_part: buffer(device, bytemuck::cast_slice(&mesh.triangles), index),
-        by_rank: buffer(device, bytemuck::cast_slice(&ranked), index),
+        parts: GpuParts::new(device, mesh),
+        by_rank: buffer(device, bytemuck::cast_slice(&ranked), wgpu::BufferUsages::INDEX),
         ranked,
     }
 }
