@@ -121,7 +121,7 @@ pub(super) struct RunArgs {
     /// Cullers (default: full simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
-    /// Oracles: sim, hardware, pyramid, always (default: sim, and hardware where a Vulkan device is found).
+    /// Oracles: sim, hardware, pyramid, read-back, always (default: sim, and hardware where a Vulkan device is found).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) oracle: Vec<String>,
     #[command(flatten)]
@@ -142,7 +142,7 @@ pub(super) struct CompareArgs {
     /// Cullers (default: full simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
-    /// Oracles: sim, hardware, pyramid, always (default: sim, and hardware where a Vulkan device is found).
+    /// Oracles: sim, hardware, pyramid, read-back, always (default: sim, and hardware where a Vulkan device is found).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) oracle: Vec<String>,
     /// Leaf sizes to compare, most triangles in a part (default: --leaf; at full size those that the

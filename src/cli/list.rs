@@ -22,6 +22,7 @@ pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<
             "pyramid",
             "the same device and answers, by maxima of its depth in place of query objects",
         ),
+        ("read-back", "the same answers, by maxima of depth that comes back from the device"),
         ("always", "everything is visible"),
     ];
     section("oracles", oracles.iter().map(|&(name, summary)| pair(name, summary)).collect())?;

@@ -11,8 +11,8 @@ use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
 use crate::check::Gate;
 use crate::cull::{Culler, CullerKind, CullerSetup};
 use crate::index::{Entry, INDEXES, IndexKind};
-use crate::oracle::wgpu::{Gpu, GpuStage, Hardware, Questions};
-use crate::oracle::{Always, CostModel, Oracle, OracleError, Sim, Stage};
+use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
+use crate::oracle::{Always, CostModel, Oracle, OracleError, Questions, Sim, Stage};
 use crate::part::PartId;
 use crate::report::{Row, table};
 use crate::run::{
@@ -42,11 +42,10 @@ pub(super) struct Oracles {
 impl Oracles {
     /// Whether every name is one of an oracle.
     pub(super) fn known(names: &[String]) -> Result<(), CliError> {
-        let known =
-            |name: &&String| ["sim", "hardware", "pyramid", "always"].contains(&name.as_str());
-        names.iter().find(|name| !known(name)).map_or(Ok(()), |name| {
-            let what =
-                format!("no oracle is called '{name}'; there are sim, hardware, pyramid, always");
+        let known: Vec<&str> =
+            ["sim", "always"].into_iter().chain(Questions::ALL.map(Questions::name)).collect();
+        names.iter().find(|name| !known.contains(&name.as_str())).map_or(Ok(()), |name| {
+            let what = format!("no oracle is called '{name}'; there are {}", known.join(", "));
             Err(CliError::Usage(what))
         })
     }
@@ -95,7 +94,7 @@ impl Oracles {
 
 /// Whether the oracle of that name asks a real device.
 fn on_device(name: &str) -> bool {
-    ["hardware", "pyramid"].contains(&name)
+    Questions::of(name).is_some()
 }
 
 struct StagedOracles<'a> {
@@ -111,8 +110,7 @@ impl StagedOracles<'_> {
             "always" => Ok(Box::<Always>::default()),
             _ => {
                 let stage = self.gpu.as_ref().expect("hardware is named only where it was opened");
-                let pyramid = name == "pyramid";
-                let questions = if pyramid { Questions::Pyramid } else { Questions::Queries };
+                let questions = Questions::of(name).expect("names are checked before");
                 Ok(Box::new(Hardware::new(stage, questions)?))
             }
         }

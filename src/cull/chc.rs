@@ -64,7 +64,7 @@ impl Culler for Chc {
                             self.opened.show(place);
                         }
                     }
-                    Appearance::Ask(_, proxy) => {
+                    Appearance::Ask { proxy, .. } => {
                         let visible_after = self.visible_after[self.scenery.slot(item)];
                         let was_visible = view.frame > 0 && visible_after == view.frame;
                         let mut place = parent;

@@ -96,7 +96,7 @@ impl ChcPlus {
         let proxy = match self.scenery.appearance(view, item) {
             Appearance::Nowhere => return,
             Appearance::Certain => None,
-            Appearance::Ask(_, proxy) => Some(proxy),
+            Appearance::Ask { proxy, .. } => Some(proxy),
         };
         let slot = self.scenery.slot(item);
         let history = self.history[slot];
@@ -107,7 +107,8 @@ impl ChcPlus {
                 let lately = view.frame > 0 && history.hidden_after == view.frame;
                 let frames = if lately { history.hidden_frames } else { 0 };
                 let chance = group::chance_of_staying_hidden(frames);
-                let proxies = self.scenery.tighter_proxies(view, item, proxy);
+                let mut proxies = Vec::new();
+                self.scenery.tighter_proxies(view, item, proxy, &mut proxies);
                 self.queued.push(node(proxies, parent, chance));
                 if self.queued.len() >= BATCH {
                     self.ask_queued(pen);

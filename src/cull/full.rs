@@ -13,21 +13,19 @@
 //!    inner nodes need no question; the paper asks about them too.
 //! 5. Candidates that have long been hidden are asked about together (`group`).
 //! 6. Tightened boxes (section 3.4) where contents stand still; lazy reconstruction is the index's.
-//! 7. Adaptive, with a cost model (the paper's conclusion): a question is asked only where what it may
-//!    save exceeds what it costs, a batch only where its questions together are worth a round trip.
 //!
 //! Departures: the paper's rule that questions with overlapping rectangles wait for one another is not
 //! kept: what was visible last time is drawn before anything is asked, so the buffer is nearly whole,
 //! and a wrong "visible" costs less than a round trip. Objects without a tree are nodes of their own.
-//! It loses against `vfc` where little is hidden, less so if adaptive; and without history, in a first
-//! frame or after a turn, it asks against a buffer that is nearly empty, and so more and in vain.
+//! It loses against `vfc` where little is hidden (`full-adaptive` does not); and without history, in a
+//! first frame or after a turn, it asks against a buffer that is nearly empty, and so more and in vain.
 
 use super::opened::{NO_PARENT, OpenedNodes};
 use super::postponement::scatter;
 use super::scenery::Appearance;
 use super::{Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, View, group};
 use crate::index::NodeId;
-use crate::oracle::{CostModel, OracleError, Proxy};
+use crate::oracle::{OracleError, Proxy};
 
 /// What can be tuned.
 #[derive(Clone, Debug)]
@@ -40,8 +38,6 @@ pub struct FullKnobs {
     pub most_together: usize,
     /// Whether to take tightened boxes.
     pub tighten: bool,
-    /// Ask only where it pays by this model.
-    pub adaptive: Option<CostModel>,
 }
 
 impl Default for FullKnobs {
@@ -51,7 +47,6 @@ impl Default for FullKnobs {
             postponement: Postponement::default(),
             most_together: 16,
             tighten: true,
-            adaptive: None,
         }
     }
 }
@@ -89,10 +84,6 @@ struct Due {
     place: usize,
 }
 
-/// The chance of being hidden that a due part is weighed with when a round trip is: even odds, since
-/// nothing was measured. It moves costs only, never a picture.
-const DUE_CHANCE: f64 = 0.5;
-
 /// What one frame has at hand.
 #[derive(Default)]
 struct Frame {
@@ -104,7 +95,6 @@ struct Frame {
 
 /// The paper's culler.
 pub struct Full {
-    name: &'static str,
     scenery: Scenery,
     knobs: FullKnobs,
     history: Vec<History>,
@@ -112,17 +102,17 @@ pub struct Full {
 }
 
 impl Full {
-    /// Over the index and partition of `setup`, under `name` in reports.
+    /// Over the index and partition of `setup`.
     ///
     /// # Panics
     /// If no question may be in flight, or none may stand in one.
     #[must_use]
-    pub fn new(name: &'static str, setup: CullerSetup, knobs: FullKnobs) -> Self {
+    pub fn new(setup: CullerSetup, knobs: FullKnobs) -> Self {
         assert!(knobs.most_in_flight > 0, "at least one question must be in flight");
         assert!(knobs.most_together > 0, "a question is about at least one node");
         let scenery_knobs = SceneryKnobs { tighten: knobs.tighten, treeless_items: true };
         let scenery = Scenery::new(setup, scenery_knobs);
-        Self { name, scenery, knobs, history: Vec::new(), frame: Frame::default() }
+        Self { scenery, knobs, history: Vec::new(), frame: Frame::default() }
     }
 
     /// Walks down from what is on the stack; draws what counts as visible, gathers the rest.
@@ -134,72 +124,19 @@ impl Full {
                     self.open(view, pen, item, parent, true);
                     continue;
                 }
-                Appearance::Ask(_, proxy) => proxy,
+                Appearance::Ask { proxy, .. } => proxy,
             };
             let history = self.history[self.scenery.slot(item)];
             let visible_last_time = view.frame > 0 && history.visible_after == view.frame;
             if !visible_last_time {
-                if self.pays(self.chance_hidden(view, item), item) {
-                    self.frame.candidates.push(Candidate { item, proxy, parent, alone: false });
-                } else {
-                    self.open(view, pen, item, parent, true);
-                }
+                self.frame.candidates.push(Candidate { item, proxy, parent, alone: false });
             } else if self.scenery.is_part(item) && view.frame >= history.ask_from {
-                // The longer it has been visible the less likely is it hidden now; what is saved is
-                // saved in all the frames until the next question.
-                let wait = f64::from(self.knobs.postponement.wait(history.streak) + 1);
-                let chance = wait / (f64::from(history.streak) + 2.0);
-                let pays = self.pays(chance, item);
-                let place = self.open(view, pen, item, parent, !pays);
-                if pays {
-                    self.frame.due.push(Due { item, proxy, place });
-                }
+                let place = self.open(view, pen, item, parent, false);
+                self.frame.due.push(Due { item, proxy, place });
             } else {
                 self.open(view, pen, item, parent, true);
             }
         }
-    }
-
-    /// Whether a question about a node that is hidden with this chance is worth asking.
-    fn pays(&self, chance: f64, item: Item) -> bool {
-        self.knobs
-            .adaptive
-            .as_ref()
-            .is_none_or(|model| self.saving(model, chance, item) > model.query_ns + model.proxy_ns)
-    }
-
-    /// What a question about such a node may be expected to save.
-    fn saving(&self, model: &CostModel, chance: f64, item: Item) -> f64 {
-        let weight = self.scenery.weight(item);
-        chance * model.drawing_ns(weight.parts, weight.triangles)
-    }
-
-    /// Whether what waits to be asked is together worth a round trip; if not, all of it is opened.
-    fn worth_a_trip(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> bool {
-        let Some(model) = &self.knobs.adaptive else { return true };
-        let saved: f64 = self
-            .frame
-            .candidates
-            .iter()
-            .map(|c| {
-                let saving = self.saving(model, self.chance_hidden(view, c.item), c.item);
-                saving - model.query_ns - model.proxy_ns
-            })
-            .sum();
-        // Due questions go along where something is asked, and are a good reason of their own once
-        // they are many.
-        let due: f64 = self.frame.due.iter().map(|d| self.saving(model, DUE_CHANCE, d.item)).sum();
-        if saved + due > model.trip_ns {
-            return true;
-        }
-        for part in std::mem::take(&mut self.frame.due) {
-            self.frame.opened.show(part.place);
-        }
-        for candidate in std::mem::take(&mut self.frame.candidates) {
-            self.open(view, pen, candidate.item, candidate.parent, true);
-        }
-        self.walk(view, pen);
-        false
     }
 
     /// Draws the node's own part or puts its children on the stack. `shows`: whether a part counts as
@@ -351,7 +288,7 @@ enum Fate {
 
 impl Culler for Full {
     fn name(&self) -> &str {
-        self.name
+        "full"
     }
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
@@ -360,9 +297,7 @@ impl Culler for Full {
         self.frame.stack.push((Item::Scene(NodeId(0)), NO_PARENT));
         self.walk(view, pen);
         while !(self.frame.candidates.is_empty() && self.frame.due.is_empty()) {
-            if self.worth_a_trip(view, pen) {
-                self.batch(view, pen)?;
-            }
+            self.batch(view, pen)?;
         }
         self.pull_up(view);
         Ok(())

@@ -97,7 +97,7 @@ impl FullWaits {
                 self.history[self.scenery.slot(item)].visible_after = view.frame + 1;
                 First::Visible
             }
-            Appearance::Ask(rectangle, proxy) => {
+            Appearance::Ask { rectangle, proxy, .. } => {
                 let history = &mut self.history[self.scenery.slot(item)];
                 let visible_last_time = view.frame > 0 && history.visible_after == view.frame;
                 if !visible_last_time {

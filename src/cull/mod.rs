@@ -2,6 +2,7 @@
 //! oracle through the [`Pen`], and draws the parts it takes for visible. One frame loop per file
 //! behind [`Culler`]; `draw_all` is the stupid one. A culler must not know the truth.
 
+mod adaptive;
 mod chc;
 mod chc_plus;
 mod draw_all;
@@ -22,6 +23,7 @@ use crate::index::Index;
 use crate::oracle::{CostModel, OracleError};
 use crate::part::Partition;
 
+pub use adaptive::Adaptive;
 pub use chc::Chc;
 pub use chc_plus::ChcPlus;
 pub use draw_all::DrawAll;
@@ -96,7 +98,7 @@ pub const CULLERS: &[CullerKind] = &[
         name: "full",
         summary: "Kovalčík & Sochor 2006: parallel queries, recent results postpone the next query",
         asks: true,
-        make: |setup| Box::new(Full::new("full", setup, FullKnobs::default())),
+        make: |setup| Box::new(Full::new(setup, FullKnobs::default())),
     },
     CullerKind {
         name: "simple",
@@ -112,13 +114,9 @@ pub const CULLERS: &[CullerKind] = &[
     },
     CullerKind {
         name: "full-adaptive",
-        summary: "full, asking only where a cost model says that it pays",
+        summary: "the same, weighing every question by a cost model (--cost): never far over vfc",
         asks: true,
-        make: |setup| {
-            let adaptive = Some(setup.cost.clone());
-            let knobs = FullKnobs { adaptive, ..FullKnobs::default() };
-            Box::new(Full::new("full-adaptive", setup, knobs))
-        },
+        make: |setup| Box::new(Adaptive::new(setup)),
     },
     CullerKind {
         name: "full-waits",

@@ -74,7 +74,14 @@ pub(super) enum Appearance {
     /// Visible without a question.
     Certain,
     /// To be asked about.
-    Ask(PixelRectangle, Proxy),
+    Ask {
+        /// Where it can be.
+        rectangle: PixelRectangle,
+        /// How near it can be, in [0, 1].
+        depth: f32,
+        /// What to ask about.
+        proxy: Proxy,
+    },
 }
 
 impl Scenery {
@@ -165,6 +172,45 @@ impl Scenery {
         }
     }
 
+    /// The same, without what is certainly outside the frustum; parts that reach into it count whole.
+    pub(super) fn weight_inside(&self, view: &View<'_>, item: Item) -> Weight {
+        match self.clip_box(view, item) {
+            Some(clip) if clip.outside_frustum() => return Weight::default(),
+            Some(clip) if clip.inside_frustum() => return self.weight(item),
+            _ if self.is_part(item) => return self.weight(item),
+            _ => {}
+        }
+        let mut sum = Weight::default();
+        let mut add = |item| sum.add(self.weight_inside(view, item));
+        match item {
+            Item::Scene(node) => {
+                let mut children = Vec::with_capacity(2);
+                self.index.children(node, view.camera.eye, &mut children);
+                children.into_iter().map(Item::Scene).for_each(&mut add);
+                let objects = self.index.node(node).objects.iter();
+                objects.map(|&object| Item::Object(object, 0)).for_each(&mut add);
+            }
+            Item::Object(object, node) => {
+                let tree = self.partition.mesh(object).tree.as_ref();
+                let children = tree.and_then(|tree| tree.nodes[node as usize].children);
+                children.into_iter().flatten().for_each(|child| add(Item::Object(object, child)));
+            }
+        }
+        sum
+    }
+
+    /// How many boxes `tightest_proxies` asks about at most, a guess for inner nodes.
+    pub(super) fn box_count(&self, item: Item) -> usize {
+        match item {
+            Item::Object(object, node) if self.is_part(item) => {
+                let mesh = self.partition.mesh(object);
+                let part = mesh.tree.as_ref().map_or(0, |t| t.nodes[node as usize].first_part);
+                mesh.boxes_of(part).len()
+            }
+            _ => 1,
+        }
+    }
+
     /// Whether the node stands for one part.
     #[must_use]
     pub fn is_part(&self, item: Item) -> bool {
@@ -227,20 +273,26 @@ impl Scenery {
                 let plain = Proxy::Rectangle { min, max, depth };
                 let proxy = match self.proxy {
                     ProxyKind::Rectangle => plain,
-                    ProxyKind::Box => self.box_proxy(view, item).unwrap_or(plain),
+                    ProxyKind::Box => self.node_box_proxy(view, item).unwrap_or(plain),
                 };
-                Appearance::Ask(rectangle, proxy)
+                Appearance::Ask { rectangle, depth, proxy }
             }
         }
     }
 
     /// What to ask about in the place of `proxy`, the node's own: the boxes below it, at most
     /// [`TIGHTER_LEVELS`] down, while their surface together is within [`TIGHTER_SURFACE`] of the
-    /// node's (Mattausch, Bittner & Wimmer 2008, section 4.2). Boxes that cannot be asked about keep
-    /// their parent's.
-    pub(super) fn tighter_proxies(&self, view: &View<'_>, item: Item, proxy: Proxy) -> Vec<Proxy> {
-        let Item::Object(object, node) = item else { return vec![proxy] };
-        let Some(tree) = &self.partition.mesh(object).tree else { return vec![proxy] };
+    /// node's (Mattausch, Bittner & Wimmer 2008, section 4.2). Where any of them cannot be asked about,
+    /// `proxy` stays. Appends nothing where none of them can be on any sample.
+    pub(super) fn tighter_proxies(
+        &self,
+        view: &View<'_>,
+        item: Item,
+        proxy: Proxy,
+        out: &mut Vec<Proxy>,
+    ) {
+        let Item::Object(object, node) = item else { return out.push(proxy) };
+        let Some(tree) = &self.partition.mesh(object).tree else { return out.push(proxy) };
         let surface = |node: u32| {
             let size = tree.nodes[node as usize].bounds.size();
             size.x * size.y + size.y * size.z + size.z * size.x
@@ -256,24 +308,85 @@ impl Scenery {
             }
             level = next;
         }
-        let mut proxies = Vec::with_capacity(level.len());
-        for &node in &level {
-            match self.appearance(view, Item::Object(object, node)) {
-                Appearance::Nowhere => {}
-                Appearance::Certain => return vec![proxy],
-                Appearance::Ask(_, proxy) => proxies.push(proxy),
+        let boxes = level.iter().map(|&node| tree.nodes[node as usize].bounds);
+        self.push_boxes(view, object, boxes, proxy, out);
+    }
+
+    /// What to ask about in the place of `proxy`, that of a part: the part's several boxes, neighbours
+    /// taken together until there are at most `most`. For what is no part, as `tighter_proxies`.
+    pub(super) fn tightest_proxies(
+        &self,
+        view: &View<'_>,
+        item: Item,
+        (proxy, most): (Proxy, usize),
+        out: &mut Vec<Proxy>,
+    ) {
+        let Item::Object(object, node) = item else { return out.push(proxy) };
+        if !self.is_part(item) {
+            return self.tighter_proxies(view, item, proxy, out);
+        }
+        let mesh = self.partition.mesh(object);
+        let part = mesh.tree.as_ref().map_or(0, |tree| tree.nodes[node as usize].first_part);
+        let boxes = mesh.boxes_of(part);
+        let together = boxes.len().div_ceil(most.max(1)).max(1).next_power_of_two();
+        let union = |run: &[Aabb]| run.iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+        self.push_boxes(view, object, boxes.chunks(together).map(union), proxy, out);
+    }
+
+    /// Appends the proxies of boxes in an object's space, or `instead` where one of them cannot be asked
+    /// about.
+    fn push_boxes(
+        &self,
+        view: &View<'_>,
+        object: ObjectId,
+        mut boxes: impl Iterator<Item = Aabb>,
+        instead: Proxy,
+        out: &mut Vec<Proxy>,
+    ) {
+        let from = out.len();
+        if !boxes.all(|aabb| self.push_box(view, object, &aabb, out)) {
+            out.truncate(from);
+            out.push(instead);
+        }
+    }
+
+    /// Appends the proxy of a box in an object's space, if it can be on any sample; false where it
+    /// cannot be asked about.
+    fn push_box(
+        &self,
+        view: &View<'_>,
+        object: ObjectId,
+        aabb: &Aabb,
+        out: &mut Vec<Proxy>,
+    ) -> bool {
+        let seen = &view.objects[object.0 as usize];
+        let clip = ClipBox::new(aabb, &seen.clip_from_object, &seen.error);
+        match clip.project(view.viewport.width, view.viewport.height) {
+            Projection::Nowhere => true,
+            Projection::Unbounded => false,
+            Projection::Within { rectangle, depth } => {
+                let PixelRectangle { min, max } = rectangle;
+                let plain = Proxy::Rectangle { min, max, depth };
+                out.push(match self.proxy {
+                    ProxyKind::Rectangle => plain,
+                    ProxyKind::Box => Self::box_proxy(view, object, aabb).unwrap_or(plain),
+                });
+                true
             }
         }
-        proxies
     }
 
     /// The inflated box of an object's node; scene nodes keep the rectangle.
-    fn box_proxy(&self, view: &View<'_>, item: Item) -> Option<Proxy> {
+    fn node_box_proxy(&self, view: &View<'_>, item: Item) -> Option<Proxy> {
         let Item::Object(object, node) = item else { return None };
+        Self::box_proxy(view, object, &self.object_box(object, node))
+    }
+
+    /// The inflated box; `None` where it cannot be inflated.
+    fn box_proxy(view: &View<'_>, object: ObjectId, aabb: &Aabb) -> Option<Proxy> {
         let seen = &view.objects[object.0 as usize];
-        let aabb = self.object_box(object, node);
         let pixels = (view.viewport.width, view.viewport.height);
-        let grown = math::inflated_box(&aabb, &seen.clip_from_object, &seen.error, pixels)?;
+        let grown = math::inflated_box(aabb, &seen.clip_from_object, &seen.error, pixels)?;
         Some(Proxy::Box {
             clip_from_box: math::rounded_clip_matrix(&seen.clip_from_object),
             min: grown.min.to_array().map(|c| c as f32),

@@ -32,7 +32,7 @@ impl Culler for Simple {
             let visible = match self.scenery.appearance(view, item) {
                 Appearance::Nowhere => false,
                 Appearance::Certain => true,
-                Appearance::Ask(_, proxy) => {
+                Appearance::Ask { proxy, .. } => {
                     pen.ask(&proxy);
                     answers.clear();
                     pen.round_trip(&mut answers)?;

@@ -7,7 +7,9 @@
 //! point in a convex box is bounded by those of its corners. Window arithmetic (reciprocal, product,
 //! scale, offset: four f32 roundings within the guard band of 2¹⁵ pixels) adds under 2⁻⁷ pixel, and
 //! snapping 2⁻⁹; both are far below [`RECTANGLE_DILATION_PIXELS`]. A triangle whose corners each moved
-//! by at most δ lies within δ of the exact one, so no sample outside the dilated rectangle is covered.
+//! by at most δ lies within δ of the exact one, and a sample is covered only if its place, the middle
+//! of its pixel, is in the triangle: so the rectangle is made of the pixels whose middles lie within
+//! the dilated bounds, bounds included, and no other sample can be covered.
 //! Depth at a sample is a convex combination of vertex depths and monotonically rounded, so it is
 //! never below the smallest vertex depth.
 
@@ -16,10 +18,10 @@ use glam::{DMat4, DVec4};
 use super::{Aabb, ClipError};
 use crate::math::clip_error::absolute;
 
-/// Dilation of a projected box beyond its transform bound, for window arithmetic (2⁻⁷ pixel) and
-/// snapping (2⁻⁹ pixel) of the reference, and the coarser snapping (down to 4 sub-pixel bits, 2⁻⁵
-/// pixel) of a device: one whole pixel holds them all.
-pub const RECTANGLE_DILATION_PIXELS: f64 = 1.0;
+/// Dilation of a projected box beyond its transform bound, for window arithmetic (2⁻⁷ pixel) and for
+/// snapping: 2⁻⁹ pixel in the reference, 2⁻⁵ at most on a device, for which Vulkan asks no fewer than
+/// 4 sub-pixel bits. Together they are under 2⁻⁴; this is twice that.
+pub const RECTANGLE_DILATION_PIXELS: f64 = 0.125;
 /// What z·(1/w) may lose: reciprocal and product, one f32 rounding each of a value in [0, 1], and one
 /// for the final rounding of an interpolated depth, doubled for the order of the bound itself.
 pub const DEPTH_ROUNDING: f64 = 6.0 * (f32::EPSILON as f64 / 2.0);
@@ -92,6 +94,14 @@ impl ClipBox {
             || beyond(&|c| c.w - c.z, ez + ew)
     }
 
+    /// Whether every corner is inside all six planes. Exact up to rounding, with no margin: for
+    /// estimates of work, never for a verdict. Any NaN makes this false.
+    #[must_use]
+    pub fn inside_frustum(&self) -> bool {
+        let inside = |c: &DVec4| c.x.abs() <= c.w && c.y.abs() <= c.w && 0.0 <= c.z && c.z <= c.w;
+        self.corners.iter().all(inside)
+    }
+
     /// The rectangle and nearest depth of the contents in a viewport of `width` × `height` pixels.
     #[must_use]
     pub fn project(&self, width: u32, height: u32) -> Projection {
@@ -116,8 +126,9 @@ impl ClipBox {
                 high = high.max(window);
             }
             let margin = (e + reach * ew) / w_min * half + RECTANGLE_DILATION_PIXELS;
+            // The first and one beyond the last pixel whose middle is within.
             let clamp = |pixel: f64| pixel.clamp(0.0, f64::from(pixels)) as u32;
-            (clamp((low - margin).floor()), clamp((high + margin).ceil()))
+            (clamp((low - margin - 0.5).ceil()), clamp((high + margin + 0.5).floor()))
         };
         let (x0, x1) = axis(0, ex, width, 1.0);
         let (y0, y1) = axis(1, ey, height, -1.0);

@@ -12,13 +12,17 @@
 use glam::{DMat4, DVec3, DVec4};
 
 use super::clip_error::absolute;
-use super::{Aabb, ClipError, RECTANGLE_DILATION_PIXELS};
+use super::{Aabb, ClipError};
 
 /// Depth by which the faces of a box proxy stand before its contents: 64 ulps of a depth near 1, for
 /// a device that evaluates a plane in f32 (three roundings of terms that stay below the viewport's
 /// size times the slope). It holds for faces that are not nearly edge-on; that is why the rectangle,
 /// which has no slope, is the default.
 pub const BOX_DEPTH_SLACK: f64 = 64.0 * (f32::EPSILON as f64 / 2.0);
+/// Pixels by which a box grows on each side: what moves its contents' corners in the window (see
+/// `RECTANGLE_DILATION_PIXELS`, under 2⁻⁴) moves its own as well, and a device evaluates the slope of
+/// its faces at places of its own within the pixel; one pixel holds all three.
+const BOX_DILATION_PIXELS: f64 = 1.0;
 /// Rounding of the inverse and of the products with it; a matrix so ill-conditioned that this does
 /// not hold gives a box that reaches the near plane, hence a rectangle.
 const INVERSE_SLACK: f64 = 2.0;
@@ -36,7 +40,7 @@ pub fn inflated_box(
 ) -> Option<Aabb> {
     let corners = aabb.corners().map(|corner| *clip_from_box * corner.extend(1.0));
     let w_max = corners.iter().fold(0.0_f64, |w, c| w.max(c.w));
-    let pixel = |pixels: u32| 2.0 * RECTANGLE_DILATION_PIXELS / f64::from(pixels) * w_max;
+    let pixel = |pixels: u32| 2.0 * BOX_DILATION_PIXELS / f64::from(pixels) * w_max;
     let own = error.bound.map(|bound| 2.0 * bound);
     let moved = DVec4::new(
         own[0] + own[3] + pixel(width),

@@ -10,6 +10,8 @@
 
 mod always;
 mod cost;
+#[cfg(feature = "hardware")]
+mod maxima;
 mod proxy_mesh;
 mod residency;
 mod sim;
@@ -106,6 +108,40 @@ impl Stage {
     }
 }
 
+/// How questions are put to a real device. The answers are the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Questions {
+    /// An occlusion query object each.
+    #[default]
+    Queries,
+    /// Rectangles by maxima of the depth target on the device. A box is not a rectangle: it counts as
+    /// visible unasked.
+    Pyramid,
+    /// The same by maxima on this side, of depth that is read back.
+    ReadBack,
+}
+
+impl Questions {
+    /// All there are.
+    pub const ALL: [Self; 3] = [Self::Queries, Self::Pyramid, Self::ReadBack];
+
+    /// The name of the oracle that asks so.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Queries => "hardware",
+            Self::Pyramid => "pyramid",
+            Self::ReadBack => "read-back",
+        }
+    }
+
+    /// The way of the oracle of that name; `None` for one that is no real device.
+    #[must_use]
+    pub fn of(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|questions| questions.name() == name)
+    }
+}
+
 /// Bytes of a MiB.
 pub const MIB: u64 = 1 << 20;
 
@@ -135,7 +171,7 @@ pub enum OracleError {
 
 /// Answers visibility questions about a frame while it is being drawn.
 pub trait Oracle {
-    /// Name for reports: `always`, `sim`, `hardware`.
+    /// Name for reports: `always`, `sim`, or one of [`Questions`].
     fn name(&self) -> &'static str;
 
     /// The adapter's name where a real device draws.

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{Answer, FrameView, Oracle, OracleError, Proxy, QueryId, ReadBack, Stage};
+use super::{Answer, FrameView, Oracle, OracleError, Proxy, QueryId, Questions, ReadBack, Stage};
 use crate::part::PartId;
 
 /// Said where a device is listed or required.
@@ -41,16 +41,6 @@ impl GpuStage {
     pub fn new(gpu: &Arc<Gpu>, _: &Stage) -> Result<Arc<Self>, OracleError> {
         match **gpu {}
     }
-}
-
-/// How questions would be put to the device.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Questions {
-    /// An occlusion query object each.
-    #[default]
-    Queries,
-    /// Rectangles by maxima of the depth target.
-    Pyramid,
 }
 
 /// An oracle that cannot be.

@@ -213,6 +213,7 @@ impl Cutter {
             source_of_rank: order.iter().map(|&(source, _)| source).collect(),
             parts: Vec::new(),
             drawable: Vec::new(),
+            boxes: Vec::new(),
             tree: None,
             bounds: self.nodes[0].bounds,
         };

@@ -6,6 +6,7 @@
 //! as the raster rules ask. A *part id* is the sum of the object's first part and the leaf's number
 //! in its tree, counted in depth-first order. Both are functions of the scene and the knobs alone.
 
+mod boxes;
 mod cut;
 mod tree;
 
@@ -87,6 +88,9 @@ pub struct PartedMesh {
     pub parts: Vec<Part>,
     /// Each part as the reference draws it; built by [`Partition::new`].
     pub drawable: Vec<plainsight_reference::fast::Mesh>,
+    /// Boxes of each part in the object's space, see [`PartedMesh::boxes_of`]; built by
+    /// [`Partition::new`].
+    pub boxes: Vec<Vec<Aabb>>,
     /// The tree over the parts; `None` for a mesh of one part.
     pub tree: Option<ObjectTree>,
     /// Tight box of all positions.
@@ -107,6 +111,13 @@ impl PartedMesh {
         let first = part.first_triangle as usize;
         let range = first..first + part.triangle_count as usize;
         (&self.triangles[range.clone()], &self.ranks[range])
+    }
+
+    /// A few boxes, in the object's space, that hold everything of a part together and are tighter
+    /// than its one box; none for an empty part.
+    #[must_use]
+    pub fn boxes_of(&self, part: u32) -> &[Aabb] {
+        &self.boxes[part as usize]
     }
 
     fn drawable(&self, part: &Part) -> plainsight_reference::fast::Mesh {
@@ -135,6 +146,7 @@ impl Partition {
         let cut = |mesh: &Arc<Mesh>| {
             let mut mesh = cut::cut(mesh, knobs);
             mesh.drawable = mesh.parts.par_iter().map(|part| mesh.drawable(part)).collect();
+            mesh.boxes = mesh.parts.par_iter().map(|part| boxes::boxes(&mesh, part)).collect();
             Arc::new(mesh)
         };
         let meshes: Vec<_> = scene.meshes.par_iter().map(cut).collect();

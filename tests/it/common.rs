@@ -5,8 +5,8 @@ use std::sync::{Arc, OnceLock};
 use plainsight::check::Gate;
 use plainsight::cull::{CullerKind, CullerSetup, ProxyKind};
 use plainsight::index::IndexKind;
-use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware, Questions};
-use plainsight::oracle::{Always, CostModel, Oracle, Sim};
+use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware};
+use plainsight::oracle::{Always, CostModel, Oracle, Questions, Sim};
 use plainsight::part::PartitionKnobs;
 use plainsight::run::{Lane, LaneInfo, Trace, World, run};
 use plainsight::scene::Viewport;
@@ -15,7 +15,7 @@ use plainsight::scene::generate::{Knobs, build};
 /// Scenes of the shared tests; `model` needs a file.
 pub(crate) const SCENES: [&str; 5] = ["bunnies", "powerplant", "city", "rooms", "soup"];
 /// Oracles of the shared tests.
-pub(crate) const ORACLES: [&str; 4] = ["sim", "hardware", "pyramid", "always"];
+pub(crate) const ORACLES: [&str; 5] = ["sim", "hardware", "pyramid", "read-back", "always"];
 
 /// The device, opened once. A test that needs one fails without it.
 pub(crate) fn gpu() -> &'static Arc<Gpu> {
@@ -48,13 +48,11 @@ pub(crate) fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
     match name {
         "sim" => Box::new(Sim::new(stage)),
         "always" => Box::<Always>::default(),
-        "hardware" | "pyramid" => {
+        _ => {
+            let questions = Questions::of(name).expect("an oracle of that name");
             let stage = GpuStage::new(gpu(), &stage).unwrap();
-            let pyramid = name == "pyramid";
-            let questions = if pyramid { Questions::Pyramid } else { Questions::Queries };
             Box::new(Hardware::new(&stage, questions).unwrap())
         }
-        _ => unreachable!("no oracle is called {name}"),
     }
 }
 

@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
 use plainsight::math::rounded_clip_matrix;
-use plainsight::oracle::wgpu::{GpuStage, Hardware, Questions};
+use plainsight::oracle::Questions;
+use plainsight::oracle::wgpu::{GpuStage, Hardware};
 use plainsight::oracle::{FrameView, Oracle, Stage, part_draw};
 use plainsight::part::{PartId, Partition, PartitionKnobs};
 use plainsight::run::{FrameState, Truth};

@@ -3,8 +3,8 @@
 
 use glam::{DMat4, DVec3, DVec4};
 use plainsight::math::{
-    Aabb, CLIP_ERROR_GAMMA, ClipBox, ClipError, DEPTH_ROUNDING, Projection, inflated_box,
-    rounded_clip_matrix,
+    Aabb, CLIP_ERROR_GAMMA, ClipBox, ClipError, DEPTH_ROUNDING, Projection,
+    RECTANGLE_DILATION_PIXELS, inflated_box, rounded_clip_matrix,
 };
 use plainsight::scene::{Camera, Stream, Viewport};
 use plainsight_reference::{Draw, Faces, Image, naive};
@@ -53,17 +53,71 @@ fn rectangle_and_depth_are_rounded_outward_by_their_margins() {
             Projection::Within { rectangle, depth } => (rectangle, depth),
             other => panic!("{other:?}"),
         };
-    // Columns 50.25 to 74.75 and rows 25.25 to 49.75 of 100, one pixel more on each side, then whole.
+    // Columns 50.25 to 74.75 and rows 25.25 to 49.75 of 100: the middles 50.5 to 74.5 and 25.5 to 49.5.
     let (rectangle, depth) = within(0.005, 0.495);
-    assert_eq!((rectangle.min, rectangle.max), ([49, 24], [76, 51]));
+    assert_eq!((rectangle.min, rectangle.max), ([50, 25], [75, 50]));
     assert!(f64::from(depth) <= 0.5 - DEPTH_ROUNDING);
     assert!(f64::from(depth.next_up()) > 0.5 - 2.0 * DEPTH_ROUNDING);
-    // Half a pixel further on each side takes the next column; an edge exactly on a column's takes it
-    // too, for the corner's own rounding is added.
-    let (wider, _) = within(-0.005, 0.505);
-    assert_eq!((wider.min[0], wider.max[0]), (48, 77));
-    let (at, _) = within(0.0, 0.5);
-    assert_eq!((at.min[0], at.max[0]), (48, 77));
+    // A middle as far outside as the dilation is taken, for the corner's own rounding is added; one a
+    // little farther is not.
+    let columns = |low: f64, high: f64| {
+        let (rectangle, _) = within(low / 50.0 - 1.0, high / 50.0 - 1.0);
+        (rectangle.min[0], rectangle.max[0])
+    };
+    let (first, last) = (50.5 + RECTANGLE_DILATION_PIXELS, 74.5 - RECTANGLE_DILATION_PIXELS);
+    assert_eq!(columns(first, last), (50, 75), "at the bound");
+    assert_eq!(columns(first - 1e-9, last + 1e-9), (50, 75), "under it");
+    assert_eq!(columns(first + 1e-9, last - 1e-9), (51, 74), "over it");
+}
+
+/// Points between two samples are on neither; a box that no sample's place touches is nowhere.
+#[test]
+fn a_box_between_samples_is_nowhere() {
+    let between = |side: f64| {
+        let (low, high) = ((50.0 - side) / 50.0 - 1.0, (50.0 + side) / 50.0 - 1.0);
+        plain([low, low, 0.5], [high, high, 0.6]).project(100, 100)
+    };
+    let bound = 0.5 - RECTANGLE_DILATION_PIXELS;
+    assert_eq!(between(bound - 1e-9), Projection::Nowhere);
+    assert!(matches!(between(bound), Projection::Within { .. }));
+}
+
+/// An attack on the dilation: triangles whose edges pass sample places at distances down to a small
+/// share of a sub-pixel, in boxes as tight as can be.
+#[test]
+fn edges_beside_sample_places_stay_inside() {
+    let mut stream = Stream::new(5, "edges beside samples");
+    let (side, mut touched) = (64_u32, 0);
+    for round in 0..4_000 {
+        let mut corner = |_| {
+            // A sample's place, and up to two sub-pixels away from it in steps of 1/32 sub-pixel.
+            let off = (f64::from(stream.below(129)) - 64.0) / (256.0 * 32.0);
+            (f64::from(stream.below(side)) + 0.5 + off) / f64::from(side) * 2.0 - 1.0
+        };
+        let positions: [[f32; 3]; 3] = [0; 3].map(|i| [corner(i) as f32, corner(i) as f32, 0.5]);
+        let bounds = Aabb::of_points(&positions);
+        let error = ClipError::of(&DMat4::IDENTITY, &DMat4::IDENTITY, bounds.max_abs());
+        let viewport = Viewport { width: side, height: side };
+        let mut image = Image::new(viewport);
+        let draw = Draw {
+            positions: &positions,
+            triangles: &[[0, 1, 2]],
+            ranks: &[0],
+            first_draw: 0,
+            clip_from_object: rounded_clip_matrix(&DMat4::IDENTITY),
+            faces: Faces::Both,
+        };
+        naive::draw(&mut image, &draw);
+        let seen = ClipBox::new(&bounds, &DMat4::IDENTITY, &error).project(side, side);
+        for sample in (0..image.sample_count()).filter(|&s| image.draw_index(s).is_some()) {
+            let at = [sample as u32 % side, sample as u32 / side];
+            let Projection::Within { rectangle: r, .. } = seen else { panic!("round {round}") };
+            assert!((0..2).all(|i| (r.min[i]..r.max[i]).contains(&at[i])), "round {round}: {at:?}");
+            let edge = |i: usize| at[i] == r.min[i] || at[i] + 1 == r.max[i];
+            touched += u32::from(edge(0) || edge(1));
+        }
+    }
+    assert!(touched > 10_000, "{touched} samples at the rectangle's edge prove little");
 }
 
 #[test]

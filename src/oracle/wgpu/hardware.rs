@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use super::images::Images;
 use super::pyramid::{Ask, Pyramid};
+use super::read_back::{DepthReader, MOST_COPIES};
 use super::stage::{GpuParts, GpuStage};
 use crate::oracle::{
-    Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Residency, Step,
-    box_proxy_triangles,
+    Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, Questions, ReadBack, Residency,
+    Step, box_proxy_triangles,
 };
 use crate::part::{ObjectId, PartId};
 use crate::scene::Viewport;
@@ -18,17 +19,6 @@ use crate::scene::Viewport;
 pub const QUERIES_PER_PASS: usize = 128;
 /// Bytes of one result.
 const RESULT_BYTES: u64 = 8;
-
-/// How questions are put to the device.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Questions {
-    /// An occlusion query object each.
-    #[default]
-    Queries,
-    /// Rectangles by maxima of the depth target, see `pyramid`. A box is not a rectangle: it counts as
-    /// visible unasked.
-    Pyramid,
-}
 
 /// One thing to do, in the order it was said.
 #[derive(Clone, Copy)]
@@ -84,6 +74,10 @@ impl Slot {
 /// A batch on its way.
 struct Flight {
     slot: Option<Slot>,
+    /// Depth on its way back, with what it is to answer.
+    depth: Option<(wgpu::Buffer, Vec<Ask>)>,
+    /// Answers already taken from it.
+    early: Vec<Answer>,
     submission: wgpu::SubmissionIndex,
     queries: Vec<QueryId>,
     /// Places in `queries` that are visible whatever the device says.
@@ -99,8 +93,6 @@ struct Limited {
     meshes: Vec<Option<GpuParts>>,
     /// Meshes that draws on their way to the device use.
     in_use: Vec<bool>,
-    /// What went wrong while drawing, told by the next submit.
-    failed: Option<OracleError>,
 }
 
 /// Occlusion queries of a Vulkan device.
@@ -115,14 +107,18 @@ pub struct Hardware {
     events: Vec<Event>,
     open: Vec<QueryId>,
     proxy_vertices: Vec<[f32; 4]>,
+    questions: Questions,
     /// Answers rectangles where query objects do not.
     pyramid: Option<Pyramid>,
+    reader: DepthReader,
     asks: Vec<Ask>,
     /// Questions of the batch that are answered "visible" without the device.
     unasked: Vec<u32>,
     flights: VecDeque<Flight>,
     free: Vec<Slot>,
     limited: Option<Limited>,
+    /// What went wrong while drawing, told by the next submit.
+    failed: Option<OracleError>,
 }
 
 impl Hardware {
@@ -158,7 +154,7 @@ impl Hardware {
             let count = partition.meshes().len();
             let residency = Residency::new(partition, knobs);
             let meshes = (0..count).map(|_| None).collect();
-            Limited { residency, meshes, in_use: vec![false; count], failed: None }
+            Limited { residency, meshes, in_use: vec![false; count] }
         });
         stage.gpu.healthy()?;
         Ok(Self {
@@ -172,12 +168,15 @@ impl Hardware {
             events: Vec::new(),
             open: Vec::new(),
             proxy_vertices: Vec::new(),
+            questions,
             pyramid,
+            reader: DepthReader::default(),
             asks: Vec::new(),
             unasked: Vec::new(),
             flights: VecDeque::new(),
             free: Vec::new(),
             limited,
+            failed: None,
         })
     }
 
@@ -206,6 +205,15 @@ impl Hardware {
             limited.in_use[mesh as usize] = true;
         }
         Ok(())
+    }
+
+    /// Sees to it that a mesh can be drawn at this point of the stream.
+    fn before_draw(&mut self, mesh: u32) -> Result<(), OracleError> {
+        // Questions so far are about the depth before this draw.
+        if self.questions == Questions::ReadBack && !self.open.is_empty() {
+            self.flush(true)?;
+        }
+        self.need(mesh)
     }
 
     /// Throws meshes out and loads others. What is still to be drawn with the former is drawn first.
@@ -238,10 +246,50 @@ impl Hardware {
         }
     }
 
+    /// Makes room for one more copy of the depth target: lands the oldest where there are too many.
+    fn spare_a_copy(&mut self) -> Result<(), OracleError> {
+        let mut flying = (0..self.flights.len()).filter(|&i| self.flights[i].depth.is_some());
+        let oldest = flying.next();
+        if flying.count() + 1 >= MOST_COPIES
+            && let Some(oldest) = oldest
+        {
+            self.stage.gpu.wait(Some(self.flights[oldest].submission.clone()))?;
+            let mut early = Vec::new();
+            let flight = &mut self.flights[oldest];
+            let (depth, queries) = (flight.depth.take(), std::mem::take(&mut flight.queries));
+            let unasked = std::mem::take(&mut flight.unasked);
+            if let Some(depth) = depth {
+                self.answer_from_depth(depth, &queries, &unasked, &mut early)?;
+            }
+            self.flights[oldest].early = early;
+        }
+        Ok(())
+    }
+
+    /// Answers the questions of a flight from its depth, which has arrived.
+    fn answer_from_depth(
+        &mut self,
+        (copy, asks): (wgpu::Buffer, Vec<Ask>),
+        queries: &[QueryId],
+        unasked: &[u32],
+        answers: &mut Vec<Answer>,
+    ) -> Result<(), OracleError> {
+        let mut shows = vec![false; queries.len()];
+        unasked.iter().for_each(|&place| shows[place as usize] = true);
+        self.reader.answer(&self.images, copy, &asks, &mut shows)?;
+        let answer = |(&query, visible)| Answer { query, visible };
+        answers.extend(queries.iter().zip(shows).map(answer));
+        Ok(())
+    }
+
     /// Sends everything since the last flush to the device. `more`: the batch is not yet ended.
     fn flush(&mut self, more: bool) -> Result<(), OracleError> {
+        let reads_back = self.questions == Questions::ReadBack && !self.open.is_empty();
+        if reads_back {
+            self.spare_a_copy()?;
+        }
         let mut encoder = self.encoder();
-        let slot = (!self.open.is_empty()).then(|| self.slot());
+        let slot = (!self.open.is_empty() && !reads_back).then(|| self.slot());
         if let Some(slot) = &slot {
             let queue = &self.stage.gpu.queue;
             if self.pyramid.is_some() {
@@ -270,8 +318,15 @@ impl Hardware {
         if let Some(slot) = &slot {
             self.encode_results(&mut encoder, slot);
         }
+        let depth = reads_back.then(|| {
+            let copy = self.reader.copy(&self.stage.gpu, &mut encoder, &self.images);
+            (copy, std::mem::take(&mut self.asks))
+        });
         let submission = self.stage.gpu.queue.submit([encoder.finish()]);
         let queries = std::mem::take(&mut self.open);
+        if let Some((copy, _)) = &depth {
+            copy.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+        }
         if let Some(slot) = &slot {
             let bytes = queries.len() as u64 * RESULT_BYTES;
             slot.staging.slice(..bytes).map_async(wgpu::MapMode::Read, |_| {});
@@ -280,7 +335,8 @@ impl Hardware {
         self.proxy_vertices.clear();
         self.asks.clear();
         let unasked = std::mem::take(&mut self.unasked);
-        self.flights.push_back(Flight { slot, submission, queries, unasked, more });
+        let early = Vec::new();
+        self.flights.push_back(Flight { slot, depth, early, submission, queries, unasked, more });
         if let Some(limited) = &mut self.limited {
             limited.in_use.fill(false);
         }
@@ -290,6 +346,10 @@ impl Hardware {
     /// Waits for a flight and appends its answers.
     fn land(&mut self, flight: Flight, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
         self.stage.gpu.wait(Some(flight.submission))?;
+        answers.extend(flight.early);
+        if let Some(depth) = flight.depth {
+            return self.answer_from_depth(depth, &flight.queries, &flight.unasked, answers);
+        }
         let Some(slot) = flight.slot else { return Ok(()) };
         {
             let bytes = flight.queries.len() as u64 * RESULT_BYTES;
@@ -323,7 +383,7 @@ impl Hardware {
         query
     }
 
-    fn ask_pyramid(&mut self, proxies: &[Proxy]) -> QueryId {
+    fn ask_rectangles(&mut self, proxies: &[Proxy]) -> QueryId {
         let (first, question) = (self.asks.len() as u32, self.open.len() as u32);
         for proxy in proxies {
             match *proxy {
@@ -333,8 +393,10 @@ impl Hardware {
                 Proxy::Box { .. } => self.unasked.push(question),
             }
         }
-        let end = self.asks.len() as u32;
-        self.events.push(Event::AskPyramid { first, end });
+        if self.pyramid.is_some() {
+            let end = self.asks.len() as u32;
+            self.events.push(Event::AskPyramid { first, end });
+        }
         self.number()
     }
 
@@ -548,7 +610,7 @@ fn rectangle(viewport: Viewport, min: [u32; 2], max: [u32; 2], depth: f32) -> [[
 
 impl Oracle for Hardware {
     fn name(&self) -> &'static str {
-        if self.pyramid.is_some() { "pyramid" } else { "hardware" }
+        self.questions.name()
     }
 
     fn device(&self) -> Option<String> {
@@ -584,19 +646,17 @@ impl Oracle for Hardware {
     fn draw_part(&mut self, part: PartId) {
         let partition = &self.stage.stage.partition;
         let mesh = partition.mesh_index(partition.locate(part).0);
-        if let Err(error) = self.need(mesh)
-            && let Some(limited) = &mut self.limited
-        {
+        if let Err(error) = self.before_draw(mesh) {
             // Nothing is encoded for a mesh that could not be loaded.
-            limited.failed.get_or_insert(error);
+            self.failed.get_or_insert(error);
             return;
         }
         self.events.push(Event::Draw(part));
     }
 
     fn ask(&mut self, proxies: &[Proxy]) -> QueryId {
-        if self.pyramid.is_some() {
-            return self.ask_pyramid(proxies);
+        if self.questions != Questions::Queries {
+            return self.ask_rectangles(proxies);
         }
         let first_vertex = self.proxy_vertices.len() as u32;
         for proxy in proxies {
@@ -616,10 +676,10 @@ impl Oracle for Hardware {
     }
 
     fn submit(&mut self) -> Result<(), OracleError> {
-        if let Some(error) = self.limited.as_mut().and_then(|limited| limited.failed.take()) {
-            return Err(error);
+        match self.failed.take() {
+            Some(error) => Err(error),
+            None => self.flush(false),
         }
-        self.flush(false)
     }
 
     fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {

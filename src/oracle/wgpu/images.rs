@@ -37,14 +37,28 @@ impl Images {
             let view = view(&ids);
             (ids, view)
         });
-        let images = if with_ids { 2 } else { 1 };
-        let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: image_bytes(viewport) * images,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let staging = staging(gpu, viewport, if with_ids { 2 } else { 1 });
         Self { viewport, depth_view: view(&depth), depth, ids, staging }
+    }
+
+    /// Pixels.
+    pub(super) fn viewport(&self) -> Viewport {
+        self.viewport
+    }
+
+    /// Samples from a row to the next in a copy.
+    pub(super) fn stride(&self) -> usize {
+        row_bytes(self.viewport) as usize / 4
+    }
+
+    /// A buffer on this side for so many copies of an image.
+    pub(super) fn new_staging(&self, gpu: &Gpu, images: u64) -> wgpu::Buffer {
+        staging(gpu, self.viewport, images)
+    }
+
+    /// Encodes a copy of the depth target to the beginning of `to`.
+    pub(super) fn copy_depth(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer) {
+        self.copy(encoder, &self.depth, to, 0);
     }
 
     pub(super) fn ids_view(&self) -> Option<&wgpu::TextureView> {
@@ -57,9 +71,9 @@ impl Images {
         gpu: &Gpu,
         mut encoder: wgpu::CommandEncoder,
     ) -> Result<ReadBack, OracleError> {
-        self.copy(&mut encoder, &self.depth, 0);
+        self.copy(&mut encoder, &self.depth, &self.staging, 0);
         if let Some((ids, _)) = &self.ids {
-            self.copy(&mut encoder, ids, image_bytes(self.viewport));
+            self.copy(&mut encoder, ids, &self.staging, image_bytes(self.viewport));
         }
         let index = gpu.queue.submit([encoder.finish()]);
         let slice = self.staging.slice(..);
@@ -78,11 +92,17 @@ impl Images {
         Ok(read_back)
     }
 
-    fn copy(&self, encoder: &mut wgpu::CommandEncoder, texture: &wgpu::Texture, offset: u64) {
+    fn copy(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        texture: &wgpu::Texture,
+        to: &wgpu::Buffer,
+        offset: u64,
+    ) {
         encoder.copy_texture_to_buffer(
             texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
-                buffer: &self.staging,
+                buffer: to,
                 layout: wgpu::TexelCopyBufferLayout {
                     offset,
                     bytes_per_row: Some(row_bytes(self.viewport)),
@@ -101,6 +121,15 @@ impl Images {
             .flat_map(move |row| row[..wide].chunks_exact(4))
             .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
     }
+}
+
+fn staging(gpu: &Gpu, viewport: Viewport, images: u64) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: image_bytes(viewport) * images,
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
 }
 
 fn extent(viewport: Viewport) -> wgpu::Extent3d {

@@ -9,8 +9,9 @@ mod gpu;
 mod hardware;
 mod images;
 mod pyramid;
+mod read_back;
 mod stage;
 
 pub use gpu::{Gpu, NO_DEVICE};
-pub use hardware::{Hardware, QUERIES_PER_PASS, Questions};
+pub use hardware::{Hardware, QUERIES_PER_PASS};
 pub use stage::GpuStage;
