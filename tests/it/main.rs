@@ -10,6 +10,7 @@ mod held;
 mod index;
 mod lavapipe;
 mod margins;
+mod memory;
 mod oracle;
 mod partition;
 mod snapshots;

@@ -97,9 +97,10 @@ struct Limited {
     residency: Residency,
     /// By mesh; what the books call resident.
     meshes: Vec<Option<GpuParts>>,
-    /// Meshes that draws on their way to the device use.
+    /// Meshes of draws that the device may not have done yet.
     in_use: Vec<bool>,
-    /// What went wrong while drawing, told by the next submit.
+    /// What went wrong while drawing, told by the next submit. Until then nothing more is drawn: the
+    /// books no longer say what is on the device.
     failed: Option<OracleError>,
 }
 
@@ -208,18 +209,23 @@ impl Hardware {
         Ok(())
     }
 
-    /// Throws meshes out and loads others. What is still to be drawn with the former is drawn first.
+    /// Throws meshes out and loads others. What is still to be drawn with the former is drawn first,
+    /// and waited for: only then does the device give their memory back.
     fn carry_out(&mut self, steps: &[Step]) -> Result<(), OracleError> {
         for step in steps {
             let Some(limited) = &mut self.limited else { break };
             match *step {
-                Step::Evict(mesh) if limited.in_use[mesh as usize] => {
-                    self.flush(true)?;
-                    let submission = self.flights.back().map(|flight| flight.submission.clone());
-                    self.stage.gpu.wait(submission)?;
+                Step::Evict(mesh) => {
+                    if limited.in_use[mesh as usize] {
+                        if !self.events.is_empty() {
+                            self.flush(true)?;
+                        }
+                        let last = self.flights.back().map(|flight| flight.submission.clone());
+                        self.stage.gpu.wait(last)?;
+                        self.all_done();
+                    }
                     self.throw_out(mesh);
                 }
-                Step::Evict(mesh) => self.throw_out(mesh),
                 Step::Load(mesh) => {
                     let partition = &self.stage.stage.partition;
                     let parts = &partition.meshes()[mesh as usize];
@@ -235,6 +241,13 @@ impl Hardware {
         let Some(limited) = &mut self.limited else { return };
         if let Some(parts) = limited.meshes[mesh as usize].take() {
             parts.destroy();
+        }
+    }
+
+    /// No draw is on its way to the device any more.
+    fn all_done(&mut self) {
+        if let Some(limited) = &mut self.limited {
+            limited.in_use.fill(false);
         }
     }
 
@@ -281,9 +294,6 @@ impl Hardware {
         self.asks.clear();
         let unasked = std::mem::take(&mut self.unasked);
         self.flights.push_back(Flight { slot, submission, queries, unasked, more });
-        if let Some(limited) = &mut self.limited {
-            limited.in_use.fill(false);
-        }
         self.stage.gpu.healthy()
     }
 
@@ -560,12 +570,16 @@ impl Oracle for Hardware {
     }
 
     fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {
-        while !self.flights.is_empty() {
-            self.collect(&mut Vec::new())?;
+        while let Some(flight) = self.flights.pop_front() {
+            self.land(flight, &mut Vec::new())?;
         }
+        // What was drawn and never submitted is forgotten.
+        self.all_done();
         if let Some(limited) = &mut self.limited {
+            if let Some(error) = limited.failed.take() {
+                return Err(error);
+            }
             let mut steps = Vec::new();
-            limited.in_use.fill(false);
             limited.residency.begin_frame(view, &mut steps);
             self.carry_out(&steps)?;
         }
@@ -582,13 +596,15 @@ impl Oracle for Hardware {
     }
 
     fn draw_part(&mut self, part: PartId) {
+        if self.limited.as_ref().is_some_and(|limited| limited.failed.is_some()) {
+            return;
+        }
         let partition = &self.stage.stage.partition;
         let mesh = partition.mesh_index(partition.locate(part).0);
         if let Err(error) = self.need(mesh)
             && let Some(limited) = &mut self.limited
         {
-            // Nothing is encoded for a mesh that could not be loaded.
-            limited.failed.get_or_insert(error);
+            limited.failed = Some(error);
             return;
         }
         self.events.push(Event::Draw(part));
@@ -623,12 +639,15 @@ impl Oracle for Hardware {
     }
 
     fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
-        while let Some(flight) = self.flights.pop_front() {
-            let more = flight.more;
+        // What an eviction sent ahead of the batch's end is handed over with the end.
+        let Some(last) = self.flights.iter().position(|flight| !flight.more) else {
+            return Ok(());
+        };
+        for flight in self.flights.drain(..=last).collect::<Vec<_>>() {
             self.land(flight, answers)?;
-            if !more {
-                break;
-            }
+        }
+        if self.flights.is_empty() && self.events.is_empty() {
+            self.all_done();
         }
         Ok(())
     }
