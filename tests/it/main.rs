@@ -2,6 +2,7 @@
 //! culler and oracle that is registered runs through it.
 
 mod broken;
+mod cache;
 mod cli;
 mod common;
 mod determinism;
