@@ -11,7 +11,7 @@
 //! | `plainsight_reference` | the truth: raster rules, naive and fast renderer, image hash | anything of plainsight |
 //! | [`math`] | boxes, planes, frustum, projection with error bounds, deterministic trigonometry | scenes |
 //! | [`scene`] | description, scene file, seed streams, generators, import | effects' state, cullers |
-//! | [`part`] | meshes cut into parts, object trees, stable ids | moving indexes, oracles |
+//! | [`part`] | meshes cut into parts, object trees and a cache of them, stable ids | moving indexes, oracles |
 //! | [`effect`] | one effect per file: (scene, t) to placements | indexes, oracles |
 //! | [`index`] | one structure over objects per file, behind one trait | scenes |
 //! | [`oracle`] | answers "would this contribute?", one oracle per file behind one trait | indexes, cullers |

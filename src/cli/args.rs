@@ -100,6 +100,10 @@ pub(super) struct SceneArgs {
     /// Out of core: the MiB that may be loaded ahead of each frame; 0 loads nothing ahead.
     #[arg(long, value_name = "MIB", requires = "memory")]
     pub(super) prefetch: Option<u32>,
+    /// Keeps object trees in this folder, one file a mesh, and reads them back where mesh and knobs
+    /// are the same. No result depends on it. Nothing is kept without it.
+    #[arg(long, value_name = "FOLDER")]
+    pub(super) cache: Option<PathBuf>,
     /// Vector instructions of the reference renderer (default: the widest of this machine). No
     /// result depends on it.
     #[arg(long, value_name = "LEVEL", value_parser = simd)]
@@ -313,7 +317,8 @@ impl SceneArgs {
         }
     }
 
-    /// The flags that lead here again, each preceded by a space; defaults are left out.
+    /// The flags that lead here again, each preceded by a space; defaults are left out, and what no
+    /// result depends on.
     pub(super) fn replay_flags(&self) -> String {
         let mut flags = String::from(if self.full_size { " --full-size" } else { "" });
         let mut add = |name: &str, value: Option<String>| {

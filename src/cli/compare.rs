@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use super::args::{CompareArgs, SceneArgs};
+use super::progress::progress_bar;
 use super::run::{
-    Finished, Named, Oracles, Plan, catch_interrupt, pick_cost, pick_cullers, pick_index,
-    progress_bar, tell_failures,
+    Finished, Named, Oracles, Plan, catch_interrupt, pick_cache, pick_cost, pick_cullers,
+    pick_index, tell_failures,
 };
 use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
 use crate::cull::CullerKind;
 use crate::oracle::CostModel;
+use crate::part::Made;
 use crate::report::{Comparison, picture_png};
 use crate::run::{Trace, depth_complexity};
 
@@ -76,21 +78,21 @@ pub(super) fn compare(
     Oracles::known(&args.oracle)?;
     let cost = pick_cost(&args.scene_args)?;
     let cases = cases(args)?;
+    let cache = pick_cache(&args.scene_args)?;
     let adapter = args.scene_args.adapter.as_deref();
     let oracles = Oracles::open(&args.oracle, adapter, streams)?;
     let out = folder(&args.out)?;
-    let mut plan = Plan { cullers: chosen, index, oracles, cost, args: &args.scene_args };
+    let mut plan = Plan { cullers: chosen, index, oracles, cost, cache, args: &args.scene_args };
     catch_interrupt();
     let bar = progress_bar();
     let (mut failed, mut csv) = (false, String::new());
     for case in &cases {
         plan.args = &case.args;
-        let mut said = Ok(());
-        let finished = plan.run_after(&case.named, &bar, &mut |world| {
+        let finished = plan.run_after(&case.named, &bar, streams, &mut |world, streams| {
             let state = crate::run::FrameState::at(world, world.scene.frames / 2);
             let complexity = depth_complexity(world, &state);
             let line = format!(
-                "{}: {} objects, {} moving, {} triangles, {} after the cut, {} parts (at most {} triangles each), {} frames; depth complexity {complexity:.1} in the middle frame; built in {:.1} s{}",
+                "{}: {} objects, {} moving, {} triangles, {} after the cut, {} parts (at most {} triangles each), {} frames; depth complexity {complexity:.1} in the middle frame; {} in {:.1} s{}",
                 case.label,
                 world.partition.object_count(),
                 world.moving_count(),
@@ -99,12 +101,13 @@ pub(super) fn compare(
                 world.partition.part_count(),
                 case.args.leaf,
                 world.scene.frames,
+                how_made(&world.made),
                 world.build_seconds,
                 peak_memory()
             );
             // Before any culler is measured, so that nobody can have chosen it by the outcome.
             let to = if args.json { &mut streams.talk } else { &mut streams.out };
-            said = bar.suspend(|| writeln!(to, "{line}"));
+            writeln!(to, "{line}")
         });
         if finished.is_err() {
             bar.finish_and_clear();
@@ -112,7 +115,6 @@ pub(super) fn compare(
             let _ = std::fs::remove_dir(&out);
         }
         let finished = finished?;
-        said?;
         failed |=
             tell_case(case, &finished, &plan.cost, (&out, &mut csv, args.json), streams, &bar)?;
     }
@@ -168,6 +170,15 @@ fn tell_case(
         }
     }
     Ok(failed)
+}
+
+/// How the object trees were come by.
+fn how_made(made: &Made) -> String {
+    match (made.cut, made.loaded) {
+        (_, 0) => "object trees built".to_owned(),
+        (0, _) => "object trees loaded".to_owned(),
+        (cut, loaded) => format!("object trees of {cut} meshes built and of {loaded} loaded"),
+    }
 }
 
 /// The most memory the process has held so far, where the system tells.

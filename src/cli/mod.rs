@@ -6,6 +6,8 @@ mod args;
 mod compare;
 mod list;
 mod picture;
+mod progress;
+mod replay;
 mod run;
 
 use std::ffi::OsString;
@@ -16,6 +18,7 @@ use clap::Parser;
 
 use crate::cull::CullerKind;
 use crate::oracle::OracleError;
+use crate::part::CacheError;
 use crate::run::RunError;
 use crate::scene::SceneError;
 
@@ -47,6 +50,8 @@ enum CliError {
     Run(#[from] RunError),
     #[error("{0}")]
     Usage(String),
+    #[error("{0}; choose another --cache")]
+    Cache(#[from] CacheError),
     #[error("{path}: cannot write: {source}; choose another --out")]
     Write { path: String, source: std::io::Error },
     #[error("writing the results: {0}")]
@@ -90,7 +95,7 @@ pub fn main(
     };
     let done = match cli.verb.unwrap_or_default() {
         args::Verb::Run(args) => run::run(&args, cullers, &mut streams),
-        args::Verb::Replay(args) => run::replay(&args, cullers, &mut streams),
+        args::Verb::Replay(args) => replay::replay(&args, cullers, &mut streams),
         args::Verb::Picture(args) => picture::picture(&args, cullers, &mut streams),
         args::Verb::Compare(args) => compare::compare(&args, cullers, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use plainsight_reference::Image;
 
 use super::args::{Layer, PictureArgs};
-use super::run::{catch_interrupt, one_lane, progress_bar};
+use super::progress::progress_bar;
+use super::run::{catch_interrupt, one_lane};
 use super::{CliError, EXIT_HELD, OutFile, Streams};
 use crate::cull::CullerKind;
 use crate::part::PartId;
@@ -40,7 +41,10 @@ pub(super) fn picture(
     let lane = (args.scene.as_str(), &args.culler, &args.oracle);
     let (plan, named) = one_lane(lane, &scene_args, cullers, streams)?;
     catch_interrupt();
-    let world = named.world(&scene_args)?;
+    let bar = progress_bar();
+    let world = named.world(&scene_args, plan.cache.as_ref(), &bar, streams);
+    bar.finish_and_clear();
+    let world = world?;
     let state = FrameState::at(&world, args.frame);
     let truth = Truth::of(&world, &state);
     let drawn: Vec<PartId> = if needs_culler {

@@ -1,19 +1,19 @@
-//! `run` and `replay`: scenes × cullers × oracles, side by side under one truth.
+//! `run`: scenes × cullers × oracles, side by side under one truth.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use serde_json::json;
+use indicatif::ProgressBar;
 
-use super::args::{ReplayArgs, RunArgs, SceneArgs, quoted};
+use super::args::{RunArgs, SceneArgs, quoted};
+use super::progress::{counting_triangles, progress_bar};
 use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
 use crate::check::Gate;
 use crate::cull::{Culler, CullerKind, CullerSetup};
 use crate::index::{Entry, INDEXES, IndexKind};
 use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
 use crate::oracle::{Always, CostModel, Oracle, OracleError, Questions, Sim, Stage};
-use crate::part::PartId;
+use crate::part::{Cache, PartId};
 use crate::report::{Row, table};
 use crate::run::{
     FrameRecord, Lane, LaneInfo, Observer, Trace, World, partition_difference, run as run_lanes,
@@ -155,12 +155,26 @@ impl Named {
         Ok(Self { name: name.to_owned(), scene: generate::open(name, &args.knobs())? })
     }
 
-    /// The scene cut into parts.
+    /// The scene cut into parts; says what was wrong with files of the cache.
     ///
     /// # Errors
     /// Where a device of `--memory` could not hold some mesh.
-    pub(super) fn world(&self, args: &SceneArgs) -> Result<World, CliError> {
-        let world = World::new(self.scene.clone(), args.partition()).rendered(args.render());
+    pub(super) fn world(
+        &self,
+        args: &SceneArgs,
+        cache: Option<&Cache>,
+        bar: &ProgressBar,
+        streams: &mut Streams<'_>,
+    ) -> Result<World, CliError> {
+        let message = format!("{}: object trees", self.name);
+        let world = counting_triangles(bar, message, |progress| {
+            World::make(self.scene.clone(), args.partition(), cache, progress)
+        });
+        let world = world.rendered(args.render());
+        bar.suspend(|| {
+            let warnings = &world.made.warnings;
+            warnings.iter().try_for_each(|line| writeln!(streams.talk, "WARNING: {line}"))
+        })?;
         let Some(memory) = args.memory() else { return Ok(world) };
         world
             .within(memory)
@@ -190,6 +204,8 @@ pub(super) struct Plan<'a> {
     pub(super) index: IndexKind,
     pub(super) oracles: Oracles,
     pub(super) cost: CostModel,
+    /// Where cut meshes are kept, if anywhere.
+    pub(super) cache: Option<Cache>,
     pub(super) args: &'a SceneArgs,
 }
 
@@ -198,10 +214,20 @@ pub(super) fn pick_cost(args: &SceneArgs) -> Result<CostModel, CliError> {
     CostModel::open(&args.cost).map_err(CliError::Usage)
 }
 
+/// The cache of that folder, made if it is not there.
+pub(super) fn pick_cache(args: &SceneArgs) -> Result<Option<Cache>, CliError> {
+    Ok(args.cache.as_deref().map(Cache::open).transpose()?)
+}
+
 impl Plan<'_> {
     /// Runs every lane of one scene.
-    pub(super) fn run(&self, named: &Named, bar: &ProgressBar) -> Result<Finished, CliError> {
-        self.run_after(named, bar, &mut |_| {})
+    pub(super) fn run(
+        &self,
+        named: &Named,
+        bar: &ProgressBar,
+        streams: &mut Streams<'_>,
+    ) -> Result<Finished, CliError> {
+        self.run_after(named, bar, streams, &mut |_, _| Ok(()))
     }
 
     /// The same; `built` sees the world before anything is run on it.
@@ -209,12 +235,12 @@ impl Plan<'_> {
         &self,
         named: &Named,
         bar: &ProgressBar,
-        built: &mut dyn FnMut(&World),
+        streams: &mut Streams<'_>,
+        built: &mut dyn FnMut(&World, &mut Streams<'_>) -> std::io::Result<()>,
     ) -> Result<Finished, CliError> {
         let name = &named.name;
-        bar.set_message(format!("{name}: building"));
-        let world = named.world(self.args)?;
-        built(&world);
+        let world = named.world(self.args, self.cache.as_ref(), bar, streams)?;
+        bar.suspend(|| built(&world, streams))?;
         let frames = world.scene.frames;
         let stage = world.stage();
         let staged = self.oracles.stage(&stage)?;
@@ -305,14 +331,6 @@ impl Plan<'_> {
     }
 }
 
-/// A bar on standard error, hidden where that is no terminal.
-pub(super) fn progress_bar() -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr_with_hz(8));
-    let style = ProgressStyle::with_template("{msg:<20} {bar:30} {pos}/{len} frames, {eta} left");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar
-}
-
 /// Lets Ctrl-C end the run at the next frame. A second handler in one process changes nothing.
 pub(super) fn catch_interrupt() {
     let _ = ctrlc::set_handler(|| {
@@ -349,6 +367,7 @@ pub(super) fn run(
         cullers: chosen,
         index,
         cost,
+        cache: pick_cache(&scene_args)?,
         oracles: Oracles::open(&args.oracle, adapter, streams)?,
         args: &scene_args,
     };
@@ -356,7 +375,7 @@ pub(super) fn run(
     let bar = progress_bar();
     let (mut rows, mut lines, mut failed) = (Vec::new(), String::new(), false);
     for named in &scenes {
-        let finished = plan.run(named, &bar);
+        let finished = plan.run(named, &bar, streams);
         if finished.is_err() {
             bar.finish_and_clear();
         }
@@ -451,69 +470,7 @@ pub(super) fn one_lane<'a>(
     let index = pick_index(&args.index)?;
     Oracles::known(oracle)?;
     let named = Named::open(scene, args)?;
+    let (cost, cache) = (pick_cost(args)?, pick_cache(args)?);
     let oracles = Oracles::open(oracle, args.adapter.as_deref(), streams)?;
-    Ok((Plan { cullers: chosen, index, oracles, cost: pick_cost(args)?, args }, named))
-}
-
-pub(super) fn replay(
-    args: &ReplayArgs,
-    cullers: &[CullerKind],
-    streams: &mut Streams<'_>,
-) -> Result<u8, CliError> {
-    let (plan, named) =
-        one_lane((&args.scene, &args.culler, &args.oracle), &args.scene_args, cullers, streams)?;
-    catch_interrupt();
-    let bar = progress_bar();
-    let finished = plan.run(&named, &bar);
-    bar.finish_and_clear();
-    let finished = finished?;
-    let (trace, gate) = (&finished.traces[0], &finished.gates[0]);
-    for frame in &trace.frames {
-        if args.json {
-            let line = json!({
-                "schema": crate::report::JSON_SCHEMA,
-                "frame": frame.frame,
-                "drawn_parts": frame.drawn_parts,
-                "visible_parts": frame.visible_parts,
-                "queries": frame.counts.queries,
-                "visible_answers": frame.counts.visible_answers,
-                "round_trips": frame.counts.round_trips,
-                "events_hash": format!("{:016x}", frame.events_hash),
-                "truth_hash": format!("{:016x}", frame.truth_hash),
-                "image_hash": format!("{:016x}", frame.image_hash),
-                "wall_ms": frame.wall_ns as f64 / 1e6,
-            });
-            writeln!(streams.out, "{line}")?;
-        } else {
-            writeln!(
-                streams.out,
-                "frame {:>4}: drew {:>5}, visible {:>5}, {:>5} queries, {:>4} trips, {:>7.1} ms, events {:016x}",
-                frame.frame,
-                frame.drawn_parts,
-                frame.visible_parts,
-                frame.counts.queries,
-                frame.counts.round_trips,
-                frame.wall_ns as f64 / 1e6,
-                frame.events_hash
-            )?;
-        }
-    }
-    let hash = format!("{:016x}", trace.hash());
-    tell_failures(gate, trace, streams)?;
-    let mut held = gate.held();
-    if let Some(expected) = args.expect.as_ref().filter(|expected| **expected != hash) {
-        writeln!(
-            streams.talk,
-            "trace hash {hash} is not the expected {expected}: another build, device or scene"
-        )?;
-        held = false;
-    }
-    if !args.json {
-        writeln!(
-            streams.out,
-            "trace hash {hash}, verdict: {}",
-            if held { "held" } else { "FAILED" }
-        )?;
-    }
-    Ok(if held { EXIT_HELD } else { EXIT_FAILED })
+    Ok((Plan { cullers: chosen, index, oracles, cost, cache, args }, named))
 }

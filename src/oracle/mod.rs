@@ -157,7 +157,7 @@ pub enum OracleError {
     Lost(String),
     /// A mesh does not fit the memory that devices are given.
     #[error(
-        "{:.2} MiB of device memory do not hold the largest mesh: give at least {}",
+        "{:.2} MiB of device memory do not hold the largest mesh; give at least {} MiB",
         *budget as f64 / MIB as f64,
         least.div_ceil(MIB)
     )]

@@ -1,16 +1,21 @@
-//! Out of core: which meshes are in a device's memory. Only meshes drawn now or expected next are
-//! resident, within a budget; what a draw finds missing is loaded late, what the predicted path leads to
-//! is loaded ahead. The conclusion of Kovalčík & Sochor 2006 asks for it, after Correa, Klosowski & Silva
-//! 2003 (iWalk: prefetching by predicted visibility).
+//! Out of core: which meshes are in a device's memory. A frame begins with no mesh resident but those
+//! drawn in the last frame and those expected next, within a budget; what a draw finds missing is loaded
+//! late, what the predicted path leads to is loaded ahead. The conclusion of Kovalčík & Sochor 2006 asks
+//! for it, after Correa, Klosowski & Silva 2003 (iWalk: prefetching by predicted visibility).
 //!
 //! This is bookkeeping alone, a pure function of the frames' matrices and the stream of draws, so that
 //! the simulated and the real device load the same meshes at the same points; `wgpu` carries the steps
 //! out with real buffers. It must not know cullers, and no picture depends on it. What the checks need
 //! of a device (its redraws) is not counted: that is the bench's memory, not the culler's.
 //!
-//! Prediction: each object's matrix goes on as it went over the last two frames, linearly. Prefetching
-//! evicts only what was not drawn in the last frame and is not expected, least recently used first, so
-//! that it cannot churn; a late load evicts whatever was used least recently.
+//! Prediction: each object's matrix goes on as it went over the last two frames, linearly; expected is
+//! the mesh of an object whose box it brings into the frustum, hidden or not. Loading ahead takes only
+//! memory that is free once the frame has let go of the rest: it throws out nothing that was drawn or is
+//! expected, so that it cannot churn. A late load throws out whatever was used least recently, where
+//! that must be in the middle of a frame.
+//!
+//! It loses where one mesh is most of the scene (a mesh is loaded whole), and where a frame draws more
+//! than the budget holds: the least recently used is then what the next frame draws first.
 
 use super::FrameView;
 use crate::math::Aabb;
@@ -24,7 +29,9 @@ const AHEAD: [u32; 4] = [1, 2, 4, 8];
 pub struct MemoryKnobs {
     /// Bytes of meshes resident at any time, at least [`least_budget`].
     pub budget_bytes: u64,
-    /// Bytes loaded ahead in a frame; 0 loads nothing ahead.
+    /// Bytes loaded ahead a frame; 0 loads nothing ahead. A mesh larger than what is left of them is
+    /// loaded all the same, and the frames after it load the less: over any frames no more than so
+    /// many bytes each, and one mesh.
     pub prefetch_bytes: u64,
 }
 
@@ -73,7 +80,7 @@ impl Memory {
 /// empty mesh has buffers of 16 bytes each.
 #[must_use]
 pub fn mesh_bytes(mesh: &PartedMesh) -> u64 {
-    let run = |items: usize, bytes: u64| (items as u64 * bytes).max(16);
+    let run = |items: usize, bytes: u64| if items == 0 { 16 } else { items as u64 * bytes };
     run(mesh.positions.len(), 16) + run(mesh.triangles.len(), 12)
 }
 
@@ -118,6 +125,8 @@ pub struct Residency {
     frame: u32,
     clock: u64,
     bytes: u64,
+    /// Bytes loaded ahead beyond the share of the frames so far.
+    debt: u64,
     counts: Memory,
 }
 
@@ -143,26 +152,29 @@ impl Residency {
             frame: 0,
             clock: 0,
             bytes: 0,
+            debt: 0,
             counts: Memory::default(),
         }
     }
 
-    /// Begins a frame. Frame 0 begins with nothing resident; before any other, what the frames so far
-    /// lead to is loaded ahead. Appends what is to be carried out.
+    /// Begins a frame. Frame 0 begins with nothing resident, uncounted; before any other, what was not
+    /// drawn in the last frame and is not expected is thrown out, and what is expected is loaded ahead.
+    /// Appends what is to be carried out.
     pub fn begin_frame(&mut self, view: &FrameView<'_>, steps: &mut Vec<Step>) {
-        self.counts = Memory::default();
+        self.counts = Memory { most_bytes: self.bytes, ..Memory::default() };
         if view.frame == 0 {
-            for mesh in 0..self.meshes.len() as u32 {
-                if self.meshes[mesh as usize].resident {
-                    self.evict(mesh, steps);
-                }
-            }
+            self.throw_out(steps, |_, _| true);
             self.counts = Memory::default();
             self.last.clear();
+            self.debt = 0;
         } else {
-            self.prefetch(steps);
+            let expected = self.expected();
+            let mut is_expected = vec![false; self.meshes.len()];
+            expected.iter().for_each(|&mesh| is_expected[mesh as usize] = true);
+            let last = self.frame + 1;
+            self.throw_out(steps, |mesh, held| !is_expected[mesh] && held.drawn_after != last);
+            self.load_ahead(&expected, steps);
         }
-        self.counts.most_bytes = self.bytes;
         self.before = std::mem::replace(&mut self.last, view.clip_from_object.to_vec());
         self.frame = view.frame;
     }
@@ -177,7 +189,7 @@ impl Residency {
         if late {
             let bytes = self.meshes[mesh as usize].bytes;
             while self.bytes + bytes > self.knobs.budget_bytes {
-                let victim = self.least_recent(|_, _| true).expect("every mesh fits the budget");
+                let victim = self.least_recent().expect("every mesh fits the budget");
                 self.evict(victim, steps);
             }
             self.load(mesh, steps);
@@ -189,7 +201,6 @@ impl Residency {
         self.counts.prefetches_used += u64::from(std::mem::take(&mut held.ahead));
         held.used = self.clock;
         held.drawn_after = self.frame + 1;
-        self.counts.most_bytes = self.counts.most_bytes.max(self.bytes);
         late
     }
 
@@ -205,11 +216,20 @@ impl Residency {
         self.bytes
     }
 
-    /// The resident mesh that was used least recently, among those that `may` go.
-    fn least_recent(&self, may: impl Fn(usize, &Held) -> bool) -> Option<u32> {
-        let held = self.meshes.iter().enumerate();
-        let victims = held.filter(|(mesh, held)| held.resident && may(*mesh, held));
-        victims.min_by_key(|(_, held)| held.used).map(|(mesh, _)| mesh as u32)
+    /// The resident mesh that was used least recently.
+    fn least_recent(&self) -> Option<u32> {
+        let resident = self.meshes.iter().enumerate().filter(|(_, held)| held.resident);
+        resident.min_by_key(|(_, held)| held.used).map(|(mesh, _)| mesh as u32)
+    }
+
+    /// Throws out every resident mesh of which `which` says so.
+    fn throw_out(&mut self, steps: &mut Vec<Step>, which: impl Fn(usize, &Held) -> bool) {
+        for mesh in 0..self.meshes.len() {
+            let held = &self.meshes[mesh];
+            if held.resident && which(mesh, held) {
+                self.evict(mesh as u32, steps);
+            }
+        }
     }
 
     fn evict(&mut self, mesh: u32, steps: &mut Vec<Step>) {
@@ -227,27 +247,24 @@ impl Residency {
         held.resident = true;
         self.bytes += held.bytes;
         assert!(self.bytes <= self.knobs.budget_bytes, "the budget is held");
+        self.counts.most_bytes = self.counts.most_bytes.max(self.bytes);
         steps.push(Step::Load(mesh));
     }
 
-    /// Loads ahead, the soonest and then the nearest first, as far as the frame's share and the budget go.
-    fn prefetch(&mut self, steps: &mut Vec<Step>) {
-        if self.knobs.prefetch_bytes == 0 {
-            return;
-        }
-        let expected = self.expected();
-        let mut is_expected = vec![false; self.meshes.len()];
-        expected.iter().for_each(|&mesh| is_expected[mesh as usize] = true);
-        let mut share = self.knobs.prefetch_bytes;
-        for mesh in expected {
+    /// Loads what is `expected`, in that order, as far as the frame's share and free memory go.
+    fn load_ahead(&mut self, expected: &[u32], steps: &mut Vec<Step>) {
+        let mut share = self.knobs.prefetch_bytes.saturating_sub(self.debt);
+        self.debt = self.debt.saturating_sub(self.knobs.prefetch_bytes);
+        for &mesh in expected {
             let Held { resident, bytes, .. } = self.meshes[mesh as usize];
-            if resident {
-                continue;
-            }
-            if bytes > share || !self.make_room(bytes, &is_expected, steps) {
+            if share == 0 {
                 break;
             }
-            share -= bytes;
+            if resident || self.bytes + bytes > self.knobs.budget_bytes {
+                continue;
+            }
+            self.debt += bytes.saturating_sub(share);
+            share = share.saturating_sub(bytes);
             self.load(mesh, steps);
             self.clock += 1;
             let held = &mut self.meshes[mesh as usize];
@@ -255,26 +272,6 @@ impl Residency {
             self.counts.prefetches += 1;
             self.counts.prefetched_bytes += bytes;
         }
-    }
-
-    /// Throws out what is neither expected nor was drawn in the last frame until `bytes` fit; false,
-    /// with nothing thrown out, where that is not enough.
-    fn make_room(&mut self, bytes: u64, expected: &[bool], steps: &mut Vec<Step>) -> bool {
-        let last = self.frame + 1;
-        let may = |mesh: usize, held: &Held| !expected[mesh] && held.drawn_after != last;
-        let held = self.meshes.iter().enumerate();
-        let spare: u64 = held
-            .filter(|(mesh, held)| held.resident && may(*mesh, held))
-            .map(|(_, h)| h.bytes)
-            .sum();
-        if self.bytes - spare + bytes > self.knobs.budget_bytes {
-            return false;
-        }
-        while self.bytes + bytes > self.knobs.budget_bytes {
-            let victim = self.least_recent(may).expect("there is enough to spare");
-            self.evict(victim, steps);
-        }
-        true
     }
 
     /// Meshes of objects that the predicted paths bring into the frustum, each once, the soonest first

@@ -18,6 +18,9 @@ use super::{Crossing, Part, PartedMesh, PartitionKnobs};
 use crate::math::Aabb;
 use crate::scene::Mesh;
 
+/// Which cut this is. It grows whenever any mesh may be cut another way than before: trees kept by an
+/// older cut are then not taken for this one's. A test holds the cut of one scene beside it.
+pub(super) const VERSION: u32 = 1;
 /// A plane is taken only if its larger side keeps at most this share (in eighths) of the triangles;
 /// otherwise splitting makes more triangles than it parts, and the cell stays a leaf above the limit.
 const MOST_KEPT_EIGHTHS: usize = 7;

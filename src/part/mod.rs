@@ -7,14 +7,20 @@
 //! in its tree, counted in depth-first order. Both are functions of the scene and the knobs alone.
 
 mod boxes;
+mod cache;
 mod cut;
+mod pack;
 mod tree;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use cache::Got;
 
 use crate::math::Aabb;
 use crate::scene::{Mesh, Scene};
 
+pub use cache::{Cache, CacheError};
 pub use tree::{ObjectNode, ObjectTree};
 
 /// How meshes become parts.
@@ -126,6 +132,17 @@ impl PartedMesh {
     }
 }
 
+/// How the cut meshes of a partition were come by.
+#[derive(Clone, Debug, Default)]
+pub struct Made {
+    /// Meshes that were cut.
+    pub cut: u32,
+    /// Meshes that were read from the cache.
+    pub loaded: u32,
+    /// What was wrong with files of the cache, a line each, in the order of the meshes.
+    pub warnings: Vec<String>,
+}
+
 /// A scene's objects cut into parts, with the numbering that ids follow.
 #[derive(Clone, Debug)]
 pub struct Partition {
@@ -142,14 +159,49 @@ impl Partition {
     /// Where the scene has 2³² − 1 or more fragments or parts: draw indices are 32 bits wide.
     #[must_use]
     pub fn new(scene: &Scene, knobs: PartitionKnobs) -> Self {
+        Self::make(scene, knobs, None, &|_, _| {}).0
+    }
+
+    /// The same, with what `cache` already holds read from there. `progress` is told, from any
+    /// thread, how many source triangles of how many are done, first at 0; the numbers may come out
+    /// of order.
+    ///
+    /// # Panics
+    /// As [`Partition::new`].
+    #[must_use]
+    pub fn make(
+        scene: &Scene,
+        knobs: PartitionKnobs,
+        cache: Option<&Cache>,
+        progress: &(dyn Fn(u64, u64) + Sync),
+    ) -> (Self, Made) {
         use rayon::prelude::*;
-        let cut = |mesh: &Arc<Mesh>| {
-            let mut mesh = cut::cut(mesh, knobs);
+        let size = |mesh: &Mesh| mesh.triangles().len() as u64;
+        let (done, total) = (AtomicU64::new(0), scene.meshes.iter().map(|mesh| size(mesh)).sum());
+        progress(0, total);
+        let get = |source: &Arc<Mesh>| {
+            let cut = || Got { mesh: cut::cut(source, knobs), loaded: false, warning: None };
+            let Got { mut mesh, loaded, warning } =
+                cache.map_or_else(cut, |cache| cache.get(source, knobs));
             mesh.drawable = mesh.parts.par_iter().map(|part| mesh.drawable(part)).collect();
             mesh.boxes = mesh.parts.par_iter().map(|part| boxes::boxes(&mesh, part)).collect();
-            Arc::new(mesh)
+            let own = size(source);
+            progress(done.fetch_add(own, Ordering::Relaxed) + own, total);
+            (Arc::new(mesh), loaded, warning)
         };
-        let meshes: Vec<_> = scene.meshes.par_iter().map(cut).collect();
+        let got: Vec<_> = scene.meshes.par_iter().map(get).collect();
+        let mut made = Made::default();
+        let mut meshes = Vec::with_capacity(got.len());
+        for (mesh, loaded, warning) in got {
+            *if loaded { &mut made.loaded } else { &mut made.cut } += 1;
+            made.warnings.extend(warning);
+            meshes.push(mesh);
+        }
+        (Self::number(scene, meshes), made)
+    }
+
+    /// Counts parts and fragments over the objects.
+    fn number(scene: &Scene, meshes: Vec<Arc<PartedMesh>>) -> Self {
         let mesh_of_object: Vec<u32> = scene.objects.iter().map(|o| o.mesh).collect();
         let running = |size: &dyn Fn(&PartedMesh) -> usize| {
             let mut sums = vec![0_u32];

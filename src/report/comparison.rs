@@ -4,6 +4,7 @@
 use serde_json::json;
 
 use super::chart::{Chart, Series};
+use super::memory::{CSV_HEAD, MemoryFigures, memory_table};
 use crate::oracle::CostModel;
 use crate::run::{FrameTrace, Trace};
 
@@ -131,6 +132,11 @@ impl Comparison<'_> {
                 mean(trace, |f| f.counts.triangles as f64),
             );
         }
+        let memory = |trace: &Trace| {
+            let figures = MemoryFigures::of(&trace.frames);
+            (trace.lane.culler.clone(), trace.frames.len(), figures)
+        };
+        text += &memory_table(&self.traces.iter().map(memory).collect::<Vec<_>>());
         text + &self.ratios()
     }
 
@@ -140,7 +146,7 @@ impl Comparison<'_> {
         let line = |trace: &Trace| {
             let row = paper(self.scene, &trace.lane.culler);
             let virtual_ms = |f: &FrameTrace| self.model.frame_total_ns(f.amounts()) as f64 / 1e6;
-            json!({
+            let mut line = json!({
                 "schema": super::JSON_SCHEMA,
                 "scene": self.scene,
                 "label": self.label,
@@ -162,8 +168,11 @@ impl Comparison<'_> {
                 "paper_parts": row.map(|r| r.parts),
                 "paper_queries": row.map(|r| r.queries),
                 "trace_hash": format!("{:016x}", trace.hash()),
-            })
-            .to_string()
+            });
+            if let Some(memory) = MemoryFigures::of(&trace.frames) {
+                line["memory"] = json!(memory);
+            }
+            line.to_string()
         };
         self.traces.iter().map(line).collect()
     }
@@ -252,13 +261,16 @@ impl Comparison<'_> {
     /// Every frame of every lane as comma-separated lines, with a head.
     #[must_use]
     pub fn csv(&self) -> String {
+        let limited = self.traces.iter().any(|t| t.frames.iter().any(|f| f.memory.is_some()));
         let mut text = String::from(
-            "scene,culler,frame,wall_ms,virtual_ms,parts,triangles,visible_parts,visible_triangles,queries,proxies,round_trips\n",
+            "scene,culler,frame,wall_ms,virtual_ms,parts,triangles,visible_parts,visible_triangles,queries,proxies,round_trips",
         );
+        text += if limited { CSV_HEAD } else { "" };
+        text.push('\n');
         for trace in self.traces {
             for f in &trace.frames {
                 text += &format!(
-                    "{},{},{},{:.3},{:.3},{},{},{},{},{},{},{}\n",
+                    "{},{},{},{:.3},{:.3},{},{},{},{},{},{},{}{}\n",
                     self.label,
                     trace.lane.culler,
                     f.frame,
@@ -270,7 +282,8 @@ impl Comparison<'_> {
                     f.visible_triangles,
                     f.counts.queries,
                     f.counts.proxies,
-                    f.counts.round_trips
+                    f.counts.round_trips,
+                    f.memory.as_ref().map_or_else(String::new, MemoryFigures::csv)
                 );
             }
         }

@@ -3,10 +3,12 @@
 
 mod chart;
 mod comparison;
+mod memory;
 mod picture;
 mod row;
 
 pub use chart::{Chart, Series};
 pub use comparison::{Comparison, Published, TABLE_1};
+pub use memory::MemoryFigures;
 pub use picture::{Shown, depth_picture, part_picture, picture_png, top_view};
 pub use row::{JSON_SCHEMA, Row, table};

@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 
+use super::memory::{MemoryFigures, memory_table};
 use crate::check::Gate;
+use crate::oracle::MIB;
 use crate::run::{Trace, World};
 
 /// Version of the JSON line; it grows when a field changes its meaning or goes.
@@ -51,6 +53,12 @@ pub struct Row {
     pub round_trips: u64,
     /// Wall time of the culler's frames, device included, milliseconds. Never compared.
     pub wall_ms: f64,
+    /// MiB of geometry that the lane's device may hold; left out where it holds all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory_budget_mib: Option<f64>,
+    /// What came of that; left out where the oracle draws on no device or memory is not limited.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory: Option<MemoryFigures>,
     /// Hash of all that must repeat, 16 hexadecimal digits.
     pub trace_hash: String,
     /// `held` or `failed`.
@@ -88,6 +96,8 @@ impl Row {
             queries: counts.queries,
             round_trips: counts.round_trips,
             wall_ms: trace.sum(|frame| frame.wall_ns) as f64 / 1e6,
+            memory_budget_mib: world.memory.map(|m| m.budget_bytes as f64 / MIB as f64),
+            memory: MemoryFigures::of(&trace.frames),
             trace_hash: format!("{:016x}", trace.hash()),
             verdict: if gate.held() { "held" } else { "failed" },
         }
@@ -109,7 +119,7 @@ impl Row {
     }
 }
 
-/// The rows as a table, figures per frame.
+/// The rows as a table, figures per frame; below it, where memory is limited, a table of that.
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
     let head =
@@ -132,5 +142,9 @@ pub fn table(rows: &[Row]) -> String {
         text.truncate(text.trim_end().len());
         text.push('\n');
     }
-    text
+    let memory = |row: &Row| {
+        let name = format!("{} {} {}", row.scene, row.culler, row.oracle);
+        (name, row.frames as usize, row.memory)
+    };
+    text + &memory_table(&rows.iter().map(memory).collect::<Vec<_>>())
 }

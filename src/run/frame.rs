@@ -11,7 +11,7 @@ use crate::effect;
 use crate::index::{Entry, Move};
 use crate::math::{ClipError, rounded_clip_matrix};
 use crate::oracle::{MemoryKnobs, OracleError, Stage, least_budget};
-use crate::part::{ObjectId, Partition, PartitionKnobs};
+use crate::part::{Cache, Made, ObjectId, Partition, PartitionKnobs};
 use crate::scene::{Camera, Scene};
 
 /// A scene ready to run: cut into parts, its declared effects built.
@@ -24,7 +24,9 @@ pub struct World {
     pub render: Options,
     /// The memory that each lane's device has for meshes; `None` holds all of them.
     pub memory: Option<MemoryKnobs>,
-    /// Wall time that cutting the meshes took, seconds; a figure for reports.
+    /// Whether the meshes were cut or read.
+    pub made: Made,
+    /// Wall time that cutting or reading the meshes took, seconds; a figure for reports.
     pub build_seconds: f64,
     effects: effect::World,
 }
@@ -33,13 +35,26 @@ impl World {
     /// Cuts the scene's meshes and builds its effects.
     #[must_use]
     pub fn new(scene: Scene, knobs: PartitionKnobs) -> Self {
+        Self::make(scene, knobs, None, &|_, _| {})
+    }
+
+    /// The same, with cut meshes kept in `cache`, and `progress` told as [`Partition::make`] says.
+    #[must_use]
+    pub fn make(
+        scene: Scene,
+        knobs: PartitionKnobs,
+        cache: Option<&Cache>,
+        progress: &(dyn Fn(u64, u64) + Sync),
+    ) -> Self {
         let scene = Arc::new(scene);
         // Wall time is reported and never compared.
         let start = Instant::now();
-        let partition = Arc::new(Partition::new(&scene, knobs));
+        let (partition, made) = Partition::make(&scene, knobs, cache, progress);
+        let partition = Arc::new(partition);
         let build_seconds = start.elapsed().as_secs_f64();
         let effects = effect::World::new(&scene);
-        Self { scene, partition, render: Options::default(), memory: None, build_seconds, effects }
+        let (render, memory) = (Options::default(), None);
+        Self { scene, partition, render, memory, made, build_seconds, effects }
     }
 
     /// The same, with the reference drawing in another way.

@@ -139,6 +139,129 @@ fn list_and_help_are_results() {
     assert!(code == 2 && talk.contains("run"), "{talk}");
 }
 
+/// The plant's largest mesh takes six MiB and more in parts of so few triangles.
+#[test]
+fn too_small_a_budget_is_one_line_and_exit_2() {
+    for verb in ["run", "replay", "picture", "compare"] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let out = ["--out", out.to_str().unwrap()];
+        let out: &[&str] = if verb == "replay" { &[] } else { &out };
+        let scene = [verb, "--scene", "powerplant", "--memory", "1", "--oracle", "sim"];
+        let small = SMALL.iter().copied().filter(|&word| verb != "picture" || word != "3");
+        let small: Vec<&str> =
+            small.filter(|&word| verb != "picture" || word != "--frames").collect();
+        let (code, said, talk) = plainsight(&[&scene, &small[..], out].concat());
+        assert_eq!(code, 2, "{verb}: {said}{talk}");
+        let says = "--memory, powerplant: 1.00 MiB of device memory do not hold the largest mesh; give at least 7 MiB";
+        assert!(talk.contains(says), "{verb} said {talk}");
+        assert_eq!(talk.lines().count(), 1, "{verb} said {talk}");
+        assert!(said.is_empty(), "{verb} wrote {said}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "{verb} left a file");
+    }
+    let (code, _, talk) = run(&["--scene", "soup", "--prefetch", "1"]);
+    assert!(code == 2 && talk.contains("--memory"), "{talk}");
+}
+
+/// Memory is told of where it is limited, in every report, and nowhere else.
+#[test]
+fn memory_is_told_where_it_is_limited() {
+    let folder = tempfile::tempdir().unwrap();
+    let figures = folder.path().join("figures");
+    let scene = ["--scene", "powerplant", "--oracle", "sim", "--culler", "vfc"];
+    let limit = ["--memory", "7", "--prefetch", "1"];
+    let call = |verb: &str, more: &[&str]| {
+        let (code, out, talk) = plainsight(&[&[verb], &scene[..], &SMALL, more].concat());
+        assert_eq!(code, 0, "{out}{talk}");
+        out
+    };
+    let (with, without) = (call("run", &limit), call("run", &[]));
+    assert!(with.contains("most MiB") && with.contains("powerplant vfc sim"), "{with}");
+    assert!(!without.contains("most MiB"), "{without}");
+    let row = |out: &str| serde_json::from_str::<serde_json::Value>(out).unwrap();
+    let with = row(&call("run", &[&limit[..], &["--json"]].concat()));
+    assert_eq!(with["memory_budget_mib"], 7.0);
+    for field in
+        "most_resident_mib late_loads late_mib prefetches prefetched_mib prefetches_used evictions"
+            .split(' ')
+    {
+        assert!(with["memory"][field].is_number(), "{field} is missing in {with}");
+    }
+    let most = with["memory"]["most_resident_mib"].as_f64().unwrap();
+    assert!(most > 3.5 && most <= 7.0, "{with}");
+    assert!(with["memory"]["late_loads"].as_u64() > Some(0), "{with}");
+    let without = row(&call("run", &["--json"]));
+    assert!(without.get("memory").is_none() && without.get("memory_budget_mib").is_none());
+    let (with, without) = (call("replay", &limit), call("replay", &[]));
+    let told = |line: &&str| line.contains("MiB resident at most");
+    assert_eq!((with.lines().filter(told).count(), without.lines().filter(told).count()), (3, 0));
+    let with = call("replay", &[&limit[..], &["--json"]].concat());
+    assert!(with.lines().all(|line| row(line)["memory"]["late_loads"].is_u64()), "{with}");
+    let out = ["--out", figures.to_str().unwrap()];
+    let series = || std::fs::read_to_string(figures.join("series.csv")).unwrap();
+    assert!(!call("compare", &out).contains("most MiB"));
+    let before = series();
+    assert!(call("compare", &[&out[..], &limit].concat()).contains("most MiB"));
+    let after = series();
+    assert!(before.lines().next().unwrap().ends_with("round_trips"));
+    let columns = |line: &str| line.split(',').count();
+    let mut lines = before.lines().zip(after.lines());
+    assert!(lines.all(|(a, b)| columns(a) + 7 == columns(b)), "{after}");
+    let line = call("compare", &[&out[..], &limit, &["--json"]].concat());
+    assert!(row(line.trim())["memory"]["evictions"].is_u64(), "{line}");
+}
+
+#[test]
+fn a_cache_is_filled_used_and_repaired() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = folder.path().join("trees");
+    let figures = folder.path().join("figures");
+    let cached = ["--cache", cache.to_str().unwrap()];
+    let scene = ["--scene", "city", "--oracle", "sim", "--culler", "vfc"];
+    let row = |more: &[&str]| {
+        let (code, out, talk) = run(&[&scene[..], &["--json"], more].concat());
+        assert_eq!(code, 0, "{talk}");
+        let row: serde_json::Value = serde_json::from_str(&out).unwrap();
+        (row["trace_hash"].to_string(), talk)
+    };
+    let (hash, talk) = row(&[]);
+    assert!(talk.is_empty() && !cache.exists(), "{talk}");
+    assert_eq!(row(&cached), (hash.clone(), String::new()));
+    let first = std::fs::read_dir(&cache).unwrap().next().unwrap().unwrap().path();
+    assert_eq!(row(&cached), (hash.clone(), String::new()));
+    std::fs::write(&first, "damaged").unwrap();
+    let (again, talk) = row(&cached);
+    assert_eq!(again, hash);
+    assert!(talk.starts_with("WARNING: ") && talk.ends_with("; cut and written anew\n"), "{talk}");
+    assert_eq!(talk.lines().count(), 1, "{talk}");
+    assert_eq!(row(&cached), (hash, String::new()));
+    let out = ["--out", figures.to_str().unwrap()];
+    for (more, says) in
+        [(&cached[..], "; object trees loaded in "), (&[], "; object trees built in ")]
+    {
+        let (code, said, talk) =
+            plainsight(&[&["compare"], &scene[..], &SMALL, &out, more].concat());
+        assert!(code == 0 && said.contains(says), "{said}{talk}");
+    }
+    let file = folder.path().join("file");
+    std::fs::write(&file, "").unwrap();
+    for verb in ["run", "replay", "picture", "compare"] {
+        let (code, said, talk) = plainsight(&[
+            verb,
+            "--scene",
+            "soup",
+            "--scale",
+            "0.02",
+            "--cache",
+            file.to_str().unwrap(),
+        ]);
+        assert_eq!(code, 2, "{verb}: {said}{talk}");
+        let says = format!("{}: cannot write object trees there: ", file.display());
+        assert!(talk.contains(&says) && talk.ends_with("; choose another --cache\n"), "{talk}");
+        assert_eq!((talk.lines().count(), said.as_str()), (1, ""), "{verb} said {talk}");
+    }
+}
+
 #[test]
 fn compare_sets_the_paper_beside_its_own_and_draws_the_figures() {
     let folder = tempfile::tempdir().unwrap();

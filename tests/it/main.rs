@@ -2,6 +2,7 @@
 //! culler and oracle that is registered runs through it.
 
 mod broken;
+mod cache;
 mod cli;
 mod common;
 mod determinism;
@@ -10,6 +11,7 @@ mod held;
 mod index;
 mod lavapipe;
 mod margins;
+mod memory;
 mod oracle;
 mod partition;
 mod snapshots;

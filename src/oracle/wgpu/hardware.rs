@@ -91,7 +91,7 @@ struct Limited {
     residency: Residency,
     /// By mesh; what the books call resident.
     meshes: Vec<Option<GpuParts>>,
-    /// Meshes that draws on their way to the device use.
+    /// Meshes of draws that the device may not have done yet.
     in_use: Vec<bool>,
 }
 
@@ -117,7 +117,8 @@ pub struct Hardware {
     flights: VecDeque<Flight>,
     free: Vec<Slot>,
     limited: Option<Limited>,
-    /// What went wrong while drawing, told by the next submit.
+    /// What went wrong while drawing, told by the next submit. Until then nothing more is drawn: the
+    /// books no longer say what is on the device.
     failed: Option<OracleError>,
 }
 
@@ -216,18 +217,23 @@ impl Hardware {
         self.need(mesh)
     }
 
-    /// Throws meshes out and loads others. What is still to be drawn with the former is drawn first.
+    /// Throws meshes out and loads others. What is still to be drawn with the former is drawn first,
+    /// and waited for: only then does the device give their memory back.
     fn carry_out(&mut self, steps: &[Step]) -> Result<(), OracleError> {
         for step in steps {
             let Some(limited) = &mut self.limited else { break };
             match *step {
-                Step::Evict(mesh) if limited.in_use[mesh as usize] => {
-                    self.flush(true)?;
-                    let submission = self.flights.back().map(|flight| flight.submission.clone());
-                    self.stage.gpu.wait(submission)?;
+                Step::Evict(mesh) => {
+                    if limited.in_use[mesh as usize] {
+                        if !self.events.is_empty() {
+                            self.flush(true)?;
+                        }
+                        let last = self.flights.back().map(|flight| flight.submission.clone());
+                        self.stage.gpu.wait(last)?;
+                        self.all_done();
+                    }
                     self.throw_out(mesh);
                 }
-                Step::Evict(mesh) => self.throw_out(mesh),
                 Step::Load(mesh) => {
                     let partition = &self.stage.stage.partition;
                     let parts = &partition.meshes()[mesh as usize];
@@ -280,6 +286,13 @@ impl Hardware {
         let answer = |(&query, visible)| Answer { query, visible };
         answers.extend(queries.iter().zip(shows).map(answer));
         Ok(())
+    }
+
+    /// No draw is on its way to the device any more.
+    fn all_done(&mut self) {
+        if let Some(limited) = &mut self.limited {
+            limited.in_use.fill(false);
+        }
     }
 
     /// Sends everything since the last flush to the device. `more`: the batch is not yet ended.
@@ -337,9 +350,6 @@ impl Hardware {
         let unasked = std::mem::take(&mut self.unasked);
         let early = Vec::new();
         self.flights.push_back(Flight { slot, depth, early, submission, queries, unasked, more });
-        if let Some(limited) = &mut self.limited {
-            limited.in_use.fill(false);
-        }
         self.stage.gpu.healthy()
     }
 
@@ -622,12 +632,16 @@ impl Oracle for Hardware {
     }
 
     fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {
-        while !self.flights.is_empty() {
-            self.collect(&mut Vec::new())?;
+        while let Some(flight) = self.flights.pop_front() {
+            self.land(flight, &mut Vec::new())?;
+        }
+        // What was drawn and never submitted is forgotten.
+        self.all_done();
+        if let Some(error) = self.failed.take() {
+            return Err(error);
         }
         if let Some(limited) = &mut self.limited {
             let mut steps = Vec::new();
-            limited.in_use.fill(false);
             limited.residency.begin_frame(view, &mut steps);
             self.carry_out(&steps)?;
         }
@@ -644,6 +658,9 @@ impl Oracle for Hardware {
     }
 
     fn draw_part(&mut self, part: PartId) {
+        if self.failed.is_some() {
+            return;
+        }
         let partition = &self.stage.stage.partition;
         let mesh = partition.mesh_index(partition.locate(part).0);
         if let Err(error) = self.before_draw(mesh) {
@@ -683,12 +700,15 @@ impl Oracle for Hardware {
     }
 
     fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
-        while let Some(flight) = self.flights.pop_front() {
-            let more = flight.more;
+        // What an eviction sent ahead of the batch's end is handed over with the end.
+        let Some(last) = self.flights.iter().position(|flight| !flight.more) else {
+            return Ok(());
+        };
+        for flight in self.flights.drain(..=last).collect::<Vec<_>>() {
             self.land(flight, answers)?;
-            if !more {
-                break;
-            }
+        }
+        if self.flights.is_empty() && self.events.is_empty() {
+            self.all_done();
         }
         Ok(())
     }
