@@ -3,6 +3,7 @@
 //! `talk`.
 
 mod args;
+mod calibrate;
 mod compare;
 mod list;
 mod picture;
@@ -93,6 +94,7 @@ pub fn main(
         args::Verb::Replay(args) => run::replay(&args, cullers, &mut streams),
         args::Verb::Picture(args) => picture::picture(&args, cullers, &mut streams),
         args::Verb::Compare(args) => compare::compare(&args, cullers, &mut streams),
+        args::Verb::Calibrate(args) => calibrate::calibrate(&args, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),
     };
     done.unwrap_or_else(|error| {

@@ -10,6 +10,7 @@
 
 mod always;
 mod cost;
+mod fit;
 mod proxy_mesh;
 mod residency;
 mod sim;
@@ -25,6 +26,7 @@ use crate::scene::Viewport;
 
 pub use always::Always;
 pub use cost::{Amounts, CostModel};
+pub use fit::{FitError, Measurement};
 #[cfg(feature = "hardware")]
 use proxy_mesh::box_proxy_triangles;
 pub use residency::{Memory, MemoryKnobs, Residency, Step, least_budget, mesh_bytes};

@@ -87,6 +87,7 @@ impl Comparison<'_> {
             triangle_ns: row.ms * 1e6 / triangles.max(1.0),
             query_ns: 0.0,
             proxy_ns: 0.0,
+            pixel_ns: 0.0,
             trip_ns: (3168.0 - 3836.0 * 2584.0 / 22344.0) * 1e6 / 14408.0,
         })
     }
@@ -157,6 +158,7 @@ impl Comparison<'_> {
                 "visible_triangles": mean(trace, |f| f.visible_triangles as f64),
                 "queries": mean(trace, |f| f.counts.queries as f64),
                 "proxies": mean(trace, |f| f.counts.proxies as f64),
+                "pixels": mean(trace, |f| f.counts.pixels as f64),
                 "round_trips": mean(trace, |f| f.counts.round_trips as f64),
                 "paper_ms": row.map(|r| r.ms),
                 "paper_parts": row.map(|r| r.parts),
@@ -253,12 +255,12 @@ impl Comparison<'_> {
     #[must_use]
     pub fn csv(&self) -> String {
         let mut text = String::from(
-            "scene,culler,frame,wall_ms,virtual_ms,parts,triangles,visible_parts,visible_triangles,queries,proxies,round_trips\n",
+            "scene,culler,frame,wall_ms,virtual_ms,parts,triangles,visible_parts,visible_triangles,queries,proxies,pixels,round_trips\n",
         );
         for trace in self.traces {
             for f in &trace.frames {
                 text += &format!(
-                    "{},{},{},{:.3},{:.3},{},{},{},{},{},{},{}\n",
+                    "{},{},{},{:.3},{:.3},{},{},{},{},{},{},{},{}\n",
                     self.label,
                     trace.lane.culler,
                     f.frame,
@@ -270,6 +272,7 @@ impl Comparison<'_> {
                     f.visible_triangles,
                     f.counts.queries,
                     f.counts.proxies,
+                    f.counts.pixels,
                     f.counts.round_trips
                 );
             }

@@ -2,6 +2,7 @@
 //! culler and oracle that is registered runs through it.
 
 mod broken;
+mod calibrate;
 mod cli;
 mod common;
 mod determinism;

@@ -1,0 +1,156 @@
+//! `calibrate`: measures designed work on an oracle, fits a cost model to it and writes the file that
+//! `--cost` reads.
+
+use serde_json::json;
+
+use super::args::{CalibrateArgs, ProxyArg};
+use super::run::{Named, Oracles, catch_interrupt, interrupted, pick_index, progress_bar};
+use super::{CliError, EXIT_HELD, OutFile, Streams};
+use crate::oracle::{CostModel, FitError, Measurement};
+use crate::run::{World, frames_to_measure, measure, workloads};
+
+/// What of the arguments would be measured otherwise than it says.
+fn refused(args: &CalibrateArgs) -> Option<String> {
+    let scene = &args.scene_args;
+    if args.oracle == "always" {
+        return Some("--oracle always takes no time; name hardware, pyramid or sim".to_owned());
+    }
+    if scene.memory.is_some() {
+        return Some("--memory: a cost model has no price for loading; leave it out".to_owned());
+    }
+    if scene.proxy == ProxyArg::Box {
+        return Some(
+            "--proxy box: what a box covers is not known, so rectangles are measured; leave it out"
+                .to_owned(),
+        );
+    }
+    (scene.cost != "lavapipe").then(|| "--cost: a model is written here, none is read".to_owned())
+}
+
+pub(super) fn calibrate(args: &CalibrateArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+    let name = std::slice::from_ref(&args.oracle);
+    Oracles::known(name)?;
+    if let Some(what) = refused(args) {
+        return Err(CliError::Usage(what));
+    }
+    // The index decides nothing here, but a misspelt one is not passed over.
+    pick_index(&args.scene_args.index)?;
+    let named = Named::open(&args.scene, &args.scene_args)?;
+    let out = OutFile::create(&args.out)?;
+    let oracles = Oracles::open(name, args.scene_args.adapter.as_deref(), streams)?;
+    catch_interrupt();
+    let bar = progress_bar();
+    bar.set_message(format!("{}: building", args.scene));
+    let world = named.world(&args.scene_args)?;
+    let measured = measure_on(args, &oracles, &world, &bar);
+    bar.finish_and_clear();
+    let (device, measurements) = measured?;
+    let model = fitted(args, &world, &device, &measurements);
+    let error = model.error_over(&measurements);
+    let text = toml::to_string(&model).expect("a model is plain data");
+    out.finish(text.as_bytes())?;
+    if args.json {
+        let line = json!({
+            "schema": crate::report::JSON_SCHEMA,
+            "device": device,
+            "oracle": args.oracle,
+            "scene": world.scene.name,
+            "measurements": measurements.len(),
+            "rounds": args.rounds,
+            "model": model,
+            "error_median": error.median,
+            "error_p95": error.p95,
+            "file": args.out.display().to_string(),
+        });
+        writeln!(streams.out, "{line}")?;
+    } else {
+        tell(args, &device, &model, error, &measurements, streams)?;
+    }
+    Ok(EXIT_HELD)
+}
+
+/// The device's name, or the oracle's where none draws, and what was measured.
+fn measure_on(
+    args: &CalibrateArgs,
+    oracles: &Oracles,
+    world: &World,
+    bar: &indicatif::ProgressBar,
+) -> Result<(String, Vec<Measurement>), CliError> {
+    let mut oracle = oracles.stage(&world.stage())?.make(&args.oracle)?;
+    let works = workloads(world, args.workloads);
+    bar.set_length(frames_to_measure(works.len(), args.rounds));
+    bar.set_message(args.scene.clone());
+    let mut tick = || {
+        bar.inc(1);
+        !interrupted()
+    };
+    let measurements = measure(world, oracle.as_mut(), &works, args.rounds, &mut tick)?;
+    Ok((oracle.device().unwrap_or_else(|| oracle.name().to_owned()), measurements))
+}
+
+fn fitted(
+    args: &CalibrateArgs,
+    world: &World,
+    device: &str,
+    measurements: &[Measurement],
+) -> CostModel {
+    let name = args.out.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let model = CostModel::fitted(name, String::new(), measurements);
+    let error = model.error_over(measurements);
+    let source = format!(
+        "fitted to {} workloads, median of {} each, oracle {} on {device}, {} x {}, {} seed {} ({} triangles in {} parts); off by {:.1} % in the median, {:.1} % at the 95th percentile",
+        measurements.len(),
+        args.rounds,
+        args.oracle,
+        world.scene.viewport.width,
+        world.scene.viewport.height,
+        world.scene.name,
+        world.scene.seed,
+        world.partition.fragment_count(),
+        world.partition.part_count(),
+        error.median * 100.0,
+        error.p95 * 100.0,
+    );
+    CostModel { source, ..model }
+}
+
+fn tell(
+    args: &CalibrateArgs,
+    device: &str,
+    model: &CostModel,
+    error: FitError,
+    measurements: &[Measurement],
+    streams: &mut Streams<'_>,
+) -> Result<(), CliError> {
+    let prices = [
+        ("frame", model.frame_ns),
+        ("part", model.part_ns),
+        ("triangle", model.triangle_ns),
+        ("query", model.query_ns),
+        ("proxy", model.proxy_ns),
+        ("pixel", model.pixel_ns),
+        ("trip", model.trip_ns),
+    ];
+    writeln!(streams.out, "{:<10} {:>14}", "price of a", "ns")?;
+    for (what, ns) in prices {
+        writeln!(streams.out, "{what:<10} {ns:>14.3}")?;
+    }
+    let times = || measurements.iter().map(|m| m.ns / 1e6);
+    writeln!(
+        streams.out,
+        "measured: {} workloads of {:.3} to {:.1} ms, median of {} each, oracle {} on {device}",
+        measurements.len(),
+        times().fold(f64::INFINITY, f64::min),
+        times().fold(0.0, f64::max),
+        args.rounds,
+        args.oracle,
+    )?;
+    writeln!(
+        streams.out,
+        "the model is off by {:.1} % in the median, {:.1} % at the 95th percentile, of the measurements it was fitted to",
+        error.median * 100.0,
+        error.p95 * 100.0,
+    )?;
+    writeln!(streams.out, "written: {0}; use it by --cost {0}", args.out.display())?;
+    Ok(())
+}
