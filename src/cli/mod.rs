@@ -37,6 +37,8 @@ pub struct Streams<'a> {
     pub out: &'a mut dyn Write,
     /// Progress, warnings, failures' details.
     pub talk: &'a mut dyn Write,
+    /// Columns of the terminal that `out` is; `None` where it is none, and nothing is broken to fit.
+    pub width: Option<usize>,
 }
 
 /// Why a verb gave up.

@@ -164,6 +164,11 @@ impl Named {
         Ok(Self { name: name.to_owned(), scene: generate::open(name, &args.knobs())? })
     }
 
+    /// Whether `--mesh` decides what is seen in it.
+    pub(super) fn takes_a_mesh(&self) -> bool {
+        self.scene.name == "bunnies" || self.scene.name.starts_with("model-")
+    }
+
     /// The scene cut into parts.
     ///
     /// # Errors

@@ -4,6 +4,7 @@
 use serde_json::json;
 
 use super::chart::{Chart, Series};
+use super::columns::{Column, Columns, wrapped};
 use crate::oracle::CostModel;
 use crate::run::{FrameTrace, Trace};
 
@@ -92,47 +93,55 @@ impl Comparison<'_> {
         })
     }
 
-    /// The table with the ratios below it.
+    /// The table with the ratios below it, for a terminal of `width` columns; `None` is as wide as it
+    /// gets.
     #[must_use]
-    pub fn table(&self) -> String {
+    pub fn table(&self, width: Option<usize>) -> String {
+        self.columns().text(width) + &wrapped(&self.ratios(), width)
+    }
+
+    fn columns(&self) -> Columns {
         let radeon = self.radeon9500();
-        let mut text = format!(
-            "{:<16} {:>9} {:>9} {:>9} {:>8} | {:>9} {:>8} | {:>9} {:>8} | {:>7} {:>11}\n",
-            self.label,
-            "wall ms",
-            "virtual",
-            "radeon",
-            "paper",
-            "parts",
-            "paper",
-            "queries",
-            "paper",
-            "trips",
-            "triangles"
-        );
-        for trace in self.traces {
+        let column = |head: &'static str, least: usize, cell: &dyn Fn(&Trace) -> String| Column {
+            head: (head, least),
+            cells: self.traces.iter().map(cell).collect(),
+        };
+        let of = |trace: &Trace, figure: &dyn Fn(Published) -> f64| {
             let row = paper(self.scene, &trace.lane.culler);
-            let of = |figure: &dyn Fn(Published) -> f64| {
-                row.map_or_else(|| "-".to_owned(), |row| format!("{:.0}", figure(row)))
-            };
-            let virtual_ms =
-                |model: &CostModel| mean(trace, |f| model.frame_total_ns(f.amounts()) as f64 / 1e6);
-            text += &format!(
-                "{:<16} {:>9.1} {:>9.1} {:>9} {:>8} | {:>9.1} {:>8} | {:>9.1} {:>8} | {:>7.1} {:>11.0}\n",
-                trace.lane.culler,
-                mean(trace, wall_ms),
-                virtual_ms(self.model),
-                radeon.as_ref().map_or("-".to_owned(), |m| format!("{:.0}", virtual_ms(m))),
-                of(&|row| row.ms),
-                mean(trace, |f| f64::from(f.drawn_parts)),
-                of(&|row| row.parts),
-                mean(trace, |f| f.counts.queries as f64),
-                of(&|row| row.queries),
-                mean(trace, |f| f.counts.round_trips as f64),
-                mean(trace, |f| f.counts.triangles as f64),
-            );
+            row.map_or_else(|| "-".to_owned(), |row| format!("{:.0}", figure(row)))
+        };
+        let virtual_ms = |trace: &Trace, model: &CostModel| {
+            mean(trace, |f| model.frame_total_ns(f.amounts()) as f64 / 1e6)
+        };
+        let tenths = |figure: f64| format!("{figure:.1}");
+        let modelled = |t: &Trace| {
+            radeon.as_ref().map_or("-".to_owned(), |m| format!("{:.0}", virtual_ms(t, m)))
+        };
+        let triangles = |t: &Trace| format!("{:.0}", mean(t, |f| f.counts.triangles as f64));
+        Columns {
+            head: (self.label.to_owned(), 16),
+            names: self.traces.iter().map(|trace| trace.lane.culler.clone()).collect(),
+            groups: vec![
+                vec![
+                    column("wall ms", 9, &|t| tenths(mean(t, wall_ms))),
+                    column("virtual", 9, &|t| tenths(virtual_ms(t, self.model))),
+                    column("radeon", 9, &modelled),
+                    column("paper", 8, &|t| of(t, &|row| row.ms)),
+                ],
+                vec![
+                    column("parts", 9, &|t| tenths(mean(t, |f| f64::from(f.drawn_parts)))),
+                    column("paper", 8, &|t| of(t, &|row| row.parts)),
+                ],
+                vec![
+                    column("queries", 9, &|t| tenths(mean(t, |f| f.counts.queries as f64))),
+                    column("paper", 8, &|t| of(t, &|row| row.queries)),
+                ],
+                vec![
+                    column("trips", 7, &|t| tenths(mean(t, |f| f.counts.round_trips as f64))),
+                    column("triangles", 11, &triangles),
+                ],
+            ],
         }
-        text + &self.ratios()
     }
 
     /// One JSON object a lane: means per frame, beside the paper's where it has the row.

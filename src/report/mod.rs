@@ -2,11 +2,13 @@
 //! gates; they decide nothing.
 
 mod chart;
+mod columns;
 mod comparison;
 mod picture;
 mod row;
 
 pub use chart::{Chart, Series};
+pub use columns::wrapped;
 pub use comparison::{Comparison, Published, TABLE_1};
 pub use picture::{Shown, depth_picture, part_picture, picture_png, top_view};
 pub use row::{JSON_SCHEMA, Row, table};

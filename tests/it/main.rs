@@ -5,6 +5,7 @@ mod broken;
 mod calibrate;
 mod cli;
 mod common;
+mod compare;
 mod determinism;
 mod golden;
 mod held;
