@@ -3,11 +3,17 @@
 
 use serde_json::json;
 
-use super::args::{CalibrateArgs, ProxyArg};
-use super::run::{Named, Oracles, catch_interrupt, interrupted, pick_index, progress_bar};
+use super::args::{CalibrateArgs, PartsArg, ProxyArg, SceneArgs};
+use super::run::{
+    Named, Oracles, StagedOracles, catch_interrupt, interrupted, pick_index, progress_bar,
+};
 use super::{CliError, EXIT_HELD, OutFile, Streams};
 use crate::oracle::{CostModel, FitError, Measurement};
-use crate::run::{World, frames_to_measure, measure, workloads};
+use crate::run::{Bench, World, frames_to_measure, measure, workloads};
+
+/// The small parts have a leaf size that is this much smaller: with the default one a hundred
+/// triangles, of which a device's price for a part is some tenths.
+const FINER: u32 = 32;
 
 /// What of the arguments would be measured otherwise than it says.
 fn refused(args: &CalibrateArgs) -> Option<String> {
@@ -41,11 +47,11 @@ pub(super) fn calibrate(args: &CalibrateArgs, streams: &mut Streams<'_>) -> Resu
     catch_interrupt();
     let bar = progress_bar();
     bar.set_message(format!("{}: building", args.scene));
-    let world = named.world(&args.scene_args)?;
-    let measured = measure_on(args, &oracles, &world, &bar);
+    let worlds = worlds(args, &named)?;
+    let measured = measure_on(args, &oracles, &worlds, &bar);
     bar.finish_and_clear();
     let (device, measurements) = measured?;
-    let model = fitted(args, &world, &device, &measurements);
+    let model = fitted(args, &worlds, &device, &measurements);
     let error = model.error_over(&measurements);
     let text = toml::to_string(&model).expect("a model is plain data");
     out.finish(text.as_bytes())?;
@@ -54,7 +60,7 @@ pub(super) fn calibrate(args: &CalibrateArgs, streams: &mut Streams<'_>) -> Resu
             "schema": crate::report::JSON_SCHEMA,
             "device": device,
             "oracle": args.oracle,
-            "scene": world.scene.name,
+            "scene": worlds[0].scene.name,
             "measurements": measurements.len(),
             "rounds": args.rounds,
             "model": model,
@@ -69,28 +75,48 @@ pub(super) fn calibrate(args: &CalibrateArgs, streams: &mut Streams<'_>) -> Resu
     Ok(EXIT_HELD)
 }
 
+/// The scene in parts of the size that the user chose and in small ones; the second at size 1 at most
+/// where the first is at full size, and with triangles whole: so many cuts would multiply them.
+fn worlds(args: &CalibrateArgs, named: &Named) -> Result<[World; 2], CliError> {
+    let coarse = &args.scene_args;
+    let leaf = (coarse.leaf / FINER).max(1);
+    let fine = SceneArgs { leaf, parts: PartsArg::Whole, full_size: false, ..coarse.clone() };
+    let again = Named::open(&args.scene, &fine)?;
+    Ok([named.world(coarse)?, again.world(&fine)?])
+}
+
 /// The device's name, or the oracle's where none draws, and what was measured.
 fn measure_on(
     args: &CalibrateArgs,
     oracles: &Oracles,
-    world: &World,
+    [coarse, fine]: &[World; 2],
     bar: &indicatif::ProgressBar,
 ) -> Result<(String, Vec<Measurement>), CliError> {
-    let mut oracle = oracles.stage(&world.stage())?.make(&args.oracle)?;
-    let works = workloads(world, args.workloads);
-    bar.set_length(frames_to_measure(works.len(), args.rounds));
+    let stages = [oracles.stage(&coarse.stage())?, oracles.stage(&fine.stage())?];
+    let bench = |world, stage: &StagedOracles<'_>, stream, count| {
+        let (oracle, works) = (stage.make(&args.oracle)?, workloads(world, stream, count));
+        Ok::<Bench<'_>, CliError>(Bench { world, oracle, works })
+    };
+    let half = args.workloads / 2;
+    let mut benches = [
+        bench(coarse, &stages[0], "calibration, large parts", args.workloads - half)?,
+        bench(fine, &stages[1], "calibration, small parts", half)?,
+    ];
+    let oracle = &benches[0].oracle;
+    let device = oracle.device().unwrap_or_else(|| oracle.name().to_owned());
+    bar.set_length(frames_to_measure(&benches, args.rounds));
     bar.set_message(args.scene.clone());
     let mut tick = || {
         bar.inc(1);
         !interrupted()
     };
-    let measurements = measure(world, oracle.as_mut(), &works, args.rounds, &mut tick)?;
-    Ok((oracle.device().unwrap_or_else(|| oracle.name().to_owned()), measurements))
+    let measurements = measure(&mut benches, args.rounds, &mut tick)?;
+    Ok((device, measurements))
 }
 
 fn fitted(
     args: &CalibrateArgs,
-    world: &World,
+    [world, fine]: &[World; 2],
     device: &str,
     measurements: &[Measurement],
 ) -> CostModel {
@@ -98,7 +124,7 @@ fn fitted(
     let model = CostModel::fitted(name, String::new(), measurements);
     let error = model.error_over(measurements);
     let source = format!(
-        "fitted to {} workloads, median of {} each, oracle {} on {device}, {} x {}, {} seed {} ({} triangles in {} parts); off by {:.1} % in the median, {:.1} % at the 95th percentile",
+        "fitted to {} workloads, median of {} each, oracle {} on {device}, {} x {}, {} seed {} ({} triangles in {} parts, {} in {}); off by {:.1} % in the median, {:.1} % at the 95th percentile",
         measurements.len(),
         args.rounds,
         args.oracle,
@@ -108,6 +134,8 @@ fn fitted(
         world.scene.seed,
         world.partition.fragment_count(),
         world.partition.part_count(),
+        fine.partition.fragment_count(),
+        fine.partition.part_count(),
         error.median * 100.0,
         error.p95 * 100.0,
     );

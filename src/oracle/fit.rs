@@ -1,6 +1,9 @@
 //! Fits the prices of a cost model to measured frames: least squares of the *relative* error under
 //! prices that may not be negative. It must not know how anything is measured.
 //!
+//! An error is relative to the *measured* time. Where measurements disagree, the fit thereby leans to
+//! the faster ones, which is right: what disturbs a machine makes it slower, never quicker.
+//!
 //! The least squares without a negative price are the plain least squares over the columns whose price
 //! is above zero (Lawson & Hanson 1974, chapter 23). There are seven columns, so all 127 choices of
 //! them are solved and the best admissible one is taken: exact, and without iterations to bound.

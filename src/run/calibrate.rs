@@ -7,7 +7,8 @@
 //! its own and over its decades: the share of the parts, whether small or large ones, how many
 //! questions, proxies in one, samples under them, round trips. Parts come from those in the frustum,
 //! in the order in which a culler would draw them: one behind the eye costs less than the model means.
-//! Every workload is run once in each round, so that a slow drift of the machine meets all alike, and
+//! A part's own price is small beside its triangles', so whoever measures should have the scene in
+//! large parts and in small ones. Every workload is run once in each round, so that a slow drift of the machine meets all alike, and
 //! counts with the median over the rounds.
 
 use std::time::Instant;
@@ -106,15 +107,16 @@ pub struct Workload {
     steps: Vec<Step>,
 }
 
-/// The workloads of a scene, a pure function of it, its seed and their number.
+/// The workloads of a scene, a pure function of it, its seed, their number and the name of the stream
+/// that they are drawn from.
 ///
 /// # Panics
 /// For a scene without frames.
 #[must_use]
-pub fn workloads(world: &World, count: u32) -> Vec<Workload> {
+pub fn workloads(world: &World, stream: &str, count: u32) -> Vec<Workload> {
     assert!(world.scene.frames > 0, "a scene has frames");
     let views = parts_in_view(world);
-    let mut stream = Stream::new(world.scene.seed, "calibration");
+    let mut stream = Stream::new(world.scene.seed, stream);
     let kinds = KINDS.iter().cycle().take(count as usize);
     let make = |&kind: &Kind| {
         let (frame, parts) = &views[stream.below(views.len() as u32) as usize];
@@ -157,7 +159,8 @@ fn scattered(stream: &mut Stream, least: f64, most: f64) -> f64 {
     libm::exp(stream.range(libm::log(least), libm::log(most)))
 }
 
-/// A random share of the parts in view, in their order: of all, of the smaller half or of the larger.
+/// A random share of the parts in view, in their order: of all, of the smaller half or of the larger; at
+/// least one where the workload is of parts alone.
 fn subset(stream: &mut Stream, kind: Kind, world: &World, parts: &[PartId]) -> Vec<PartId> {
     if kind == Kind::Nothing || parts.is_empty() {
         return Vec::new();
@@ -175,7 +178,11 @@ fn subset(stream: &mut Stream, kind: Kind, world: &World, parts: &[PartId]) -> V
         };
         stream.unit() < share && in_half
     };
-    parts.iter().copied().filter(|part| taken(part)).collect()
+    let mut subset: Vec<PartId> = parts.iter().copied().filter(|part| taken(part)).collect();
+    if subset.is_empty() && kind == Kind::Parts {
+        subset.push(parts[stream.below(parts.len() as u32) as usize]);
+    }
+    subset
 }
 
 /// The questions of each round trip; a trip has at least one, as no culler waits for nothing.
@@ -235,43 +242,61 @@ fn steps(stream: &mut Stream, parts: Vec<PartId>, trips: Vec<Vec<Vec<Proxy>>>) -
     steps
 }
 
-/// How many frames [`measure`] runs.
-#[must_use]
-pub fn frames_to_measure(workloads: usize, rounds: u32) -> u64 {
-    (workloads.min(KINDS.len()) + workloads * rounds as usize) as u64
+/// Workloads with the world they are of and an oracle over it.
+pub struct Bench<'a> {
+    /// The world.
+    pub world: &'a World,
+    /// An oracle over its stage.
+    pub oracle: Box<dyn Oracle + 'a>,
+    /// What to do, made by [`workloads`] of this world.
+    pub works: Vec<Workload>,
 }
 
-/// Runs every workload on the oracle and takes the median of its times over `rounds`, in the order of
-/// `workloads`. One of each kind is run before that: the first frames of a device compile its shaders.
-/// `tick` is called after each frame and stops the measuring by returning false.
+/// How many frames [`measure`] runs.
+#[must_use]
+pub fn frames_to_measure(benches: &[Bench<'_>], rounds: u32) -> u64 {
+    let warming = |bench: &Bench<'_>| bench.works.len().min(KINDS.len());
+    let of = |bench| warming(bench) + bench.works.len() * rounds as usize;
+    benches.iter().map(of).sum::<usize>() as u64
+}
+
+/// Runs every workload and takes the median of its times over `rounds`; the measurements stand in the
+/// order of `benches` and their works. One of each kind is run before that: the first frames of a
+/// device compile its shaders. `tick` is called after each frame and stops the measuring by returning
+/// false.
 ///
 /// # Errors
-/// [`RunError::Oracle`] where the oracle gives up, [`RunError::Interrupted`] where `tick` says so.
+/// [`RunError::Oracle`] where an oracle gives up, [`RunError::Interrupted`] where `tick` says so.
 ///
 /// # Panics
 /// For no rounds.
 pub fn measure(
-    world: &World,
-    oracle: &mut dyn Oracle,
-    workloads: &[Workload],
+    benches: &mut [Bench<'_>],
     rounds: u32,
     tick: &mut dyn FnMut() -> bool,
 ) -> Result<Vec<Measurement>, RunError> {
     assert!(rounds > 0, "a median is over at least one time");
-    let mut last = workloads.iter().map(|w| w.frame).collect::<Vec<_>>();
-    last.sort_unstable();
-    last.dedup();
-    let states: Vec<FrameState> = last.iter().map(|&t| FrameState::at(world, t)).collect();
-    let mut run = |workload: &Workload| -> Result<Measurement, RunError> {
-        let state = states.iter().find(|state| state.frame == workload.frame);
-        let measured = run_once(world, oracle, state.expect("each has its state"), workload)?;
+    let states: Vec<Vec<FrameState>> = benches.iter().map(states).collect();
+    let mut run = |bench: &mut Bench<'_>, states: &[FrameState], work: usize| {
+        let Bench { world, oracle, works } = bench;
+        let state = states.iter().find(|state| state.frame == works[work].frame);
+        let state = state.expect("each frame has its state");
+        let measured = run_once(world, oracle.as_mut(), state, &works[work])?;
         if tick() { Ok(measured) } else { Err(RunError::Interrupted) }
     };
-    workloads.iter().take(KINDS.len()).try_for_each(|workload| run(workload).map(drop))?;
-    let mut times: Vec<Vec<Measurement>> = vec![Vec::new(); workloads.len()];
+    for (bench, states) in benches.iter_mut().zip(&states) {
+        for work in 0..bench.works.len().min(KINDS.len()) {
+            run(bench, states, work)?;
+        }
+    }
+    let mut times: Vec<Vec<Measurement>> = Vec::new();
+    times.resize_with(benches.iter().map(|bench| bench.works.len()).sum(), Vec::new);
     for _ in 0..rounds {
-        for (workload, times) in workloads.iter().zip(&mut times) {
-            times.push(run(workload)?);
+        let mut times = times.iter_mut();
+        for (bench, states) in benches.iter_mut().zip(&states) {
+            for (work, times) in (0..bench.works.len()).zip(&mut times) {
+                times.push(run(bench, states, work)?);
+            }
         }
     }
     let median = |mut times: Vec<Measurement>| {
@@ -279,6 +304,14 @@ pub fn measure(
         times[times.len() / 2]
     };
     Ok(times.into_iter().map(median).collect())
+}
+
+/// The states of the frames that the works are of.
+fn states(bench: &Bench<'_>) -> Vec<FrameState> {
+    let mut frames: Vec<u32> = bench.works.iter().map(|work| work.frame).collect();
+    frames.sort_unstable();
+    frames.dedup();
+    frames.into_iter().map(|t| FrameState::at(bench.world, t)).collect()
 }
 
 /// One frame, timed as a lane's frame is: through a pen, up to the end of its last batch.
@@ -322,16 +355,21 @@ mod tests {
         World::new(build("bunnies", &knobs).unwrap(), knobs_of_parts)
     }
 
+    fn bench<'a>(world: &'a World, works: &[Workload]) -> Bench<'a> {
+        Bench { world, oracle: Box::new(Sim::new(world.stage())), works: works.to_vec() }
+    }
+
     fn measured(world: &World, works: &[Workload]) -> Vec<Measurement> {
-        measure(world, &mut Sim::new(world.stage()), works, 2, &mut || true).unwrap()
+        measure(&mut [bench(world, works)], 2, &mut || true).unwrap()
     }
 
     #[test]
     fn work_is_a_function_of_the_seed_and_every_kind_is_there() {
         let world = world(3);
-        let works = workloads(&world, 40);
-        assert_eq!(works, workloads(&world, 40));
-        assert_ne!(works, workloads(&self::world(4), 40));
+        let works = workloads(&world, "a", 40);
+        assert_eq!(works, workloads(&world, "a", 40));
+        assert_ne!(works, workloads(&world, "b", 40));
+        assert_ne!(works, workloads(&self::world(4), "a", 40));
         let amounts: Vec<_> = measured(&world, &works).iter().map(|m| m.work).collect();
         let again: Vec<_> = measured(&world, &works).iter().map(|m| m.work).collect();
         assert_eq!(amounts, again);
@@ -349,18 +387,22 @@ mod tests {
     #[test]
     fn measuring_stops_when_told() {
         let world = world(3);
-        let works = workloads(&world, 16);
+        let (few, more) = (workloads(&world, "a", 16), workloads(&world, "b", 21));
         let (mut left, mut frames) = (20, 0_u64);
-        let mut oracle = Sim::new(world.stage());
-        let stopped = measure(&world, &mut oracle, &works, 2, &mut || {
+        let mut benches = [bench(&world, &few), bench(&world, &more)];
+        let stopped = measure(&mut benches, 2, &mut || {
             left -= 1;
             left > 0
         });
         assert!(matches!(stopped, Err(RunError::Interrupted)) && left == 0);
-        let all = measure(&world, &mut oracle, &works, 2, &mut || {
+        let all = measure(&mut benches, 2, &mut || {
             frames += 1;
             true
         });
-        assert_eq!((all.unwrap().len(), frames), (16, frames_to_measure(16, 2)));
+        let works = |m: &[Measurement]| m.iter().map(|m| m.work).collect::<Vec<_>>();
+        let all = works(&all.unwrap());
+        assert_eq!(frames, frames_to_measure(&benches, 2));
+        let alone = [measured(&world, &few), measured(&world, &more)].concat();
+        assert_eq!(all, works(&alone), "in the order of the benches");
     }
 }

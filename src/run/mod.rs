@@ -8,7 +8,7 @@ mod lane;
 mod trace;
 mod truth;
 
-pub use calibrate::{CalibrationKnobs, Workload, frames_to_measure, measure, workloads};
+pub use calibrate::{Bench, CalibrationKnobs, Workload, frames_to_measure, measure, workloads};
 pub use frame::{FrameState, World};
 pub use lane::{Lane, LaneInfo, Observer, RunError, run};
 pub use trace::{DeviceImages, FrameRecord, FrameTrace, Trace};
