@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs every test. Installs Mesa's lavapipe with the system's package manager where no Vulkan device
-# is found, and pins it, so that the hardware tests mean the same everywhere. Arguments go to cargo
-# test.
+# is found, and pins it, so that the hardware tests mean the same everywhere. PLAINSIGHT_MODELS may name
+# a folder of sample models (see tests/it/compare.rs). Arguments go to cargo test.
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -16,6 +16,9 @@ impl CountsCheck {
     pub fn frame(&mut self, record: &FrameRecord<'_>) {
         let counts = record.counts;
         self.total.queries += counts.queries;
+        self.total.proxies += counts.proxies;
+        self.total.pixels += counts.pixels;
+        self.total.triangles += counts.triangles;
         self.total.visible_answers += counts.visible_answers;
         self.total.round_trips += counts.round_trips;
         if counts.visible_answers > counts.queries {

@@ -8,6 +8,7 @@ use plainsight_reference::fast::{Options, SimdLevel};
 use crate::cull::ProxyKind;
 use crate::oracle::{MIB, MemoryKnobs};
 use crate::part::{Crossing, PartitionKnobs};
+use crate::run::CalibrationKnobs;
 use crate::scene::Viewport;
 use crate::scene::generate::{CameraMode, Knobs};
 
@@ -35,6 +36,8 @@ pub(super) enum Verb {
     Picture(PictureArgs),
     /// Set cullers beside Table 1 and Figures 6 to 9 of Kovalčík & Sochor 2006, on the same frames.
     Compare(CompareArgs),
+    /// Measure what work costs a device and write the file that `--cost` reads.
+    Calibrate(CalibrateArgs),
     /// List scenes, cullers, oracles, indexes and devices.
     List,
 }
@@ -90,8 +93,8 @@ pub(super) struct SceneArgs {
     /// What is asked about in the place of geometry.
     #[arg(long, value_enum, default_value_t = ProxyArg::Rectangle)]
     pub(super) proxy: ProxyArg,
-    /// What work costs the device, for adaptive cullers and virtual time: lavapipe, or a calibration
-    /// file.
+    /// What work costs the device, for adaptive cullers and virtual time: lavapipe, or a file that
+    /// `calibrate` wrote.
     #[arg(long, value_name = "NAME|FILE.toml", default_value = "lavapipe")]
     pub(super) cost: String,
     /// Out of core: the MiB of geometry that each lane's device may hold (default: all of it).
@@ -207,6 +210,33 @@ pub(super) struct PictureArgs {
     /// The PNG file (default: SCENE-FRAME-LAYER.png).
     #[arg(long, value_name = "FILE.png")]
     pub(super) out: Option<PathBuf>,
+}
+
+#[derive(Args, Clone)]
+pub(super) struct CalibrateArgs {
+    /// The scene whose parts are drawn, by name or file.
+    #[arg(long, default_value = "powerplant", value_name = "NAME|FILE.toml")]
+    pub(super) scene: String,
+    /// The oracle that is measured: hardware, pyramid or sim.
+    #[arg(long, default_value = "hardware")]
+    pub(super) oracle: String,
+    /// Different workloads to measure.
+    #[arg(long, default_value_t = CalibrationKnobs::default().workloads,
+        value_parser = clap::value_parser!(u32)
+            .range(i64::from(CalibrationKnobs::LEAST_WORKLOADS)..=100_000))]
+    pub(super) workloads: u32,
+    /// How often each is measured; the median counts.
+    #[arg(long, default_value_t = CalibrationKnobs::default().rounds,
+        value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(super) rounds: u32,
+    #[command(flatten)]
+    pub(super) scene_args: SceneArgs,
+    /// One JSON object on standard output in place of the table.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// The calibration file; its stem becomes the model's name.
+    #[arg(long, value_name = "FILE.toml", default_value = "calibration.toml")]
+    pub(super) out: PathBuf,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -12,7 +12,7 @@ use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
 use crate::cull::CullerKind;
 use crate::oracle::CostModel;
 use crate::part::Made;
-use crate::report::{Comparison, picture_png};
+use crate::report::{Comparison, picture_png, wrapped};
 use crate::run::{Trace, depth_complexity};
 
 /// The scenes of the paper.
@@ -35,7 +35,7 @@ fn cases(args: &CompareArgs) -> Result<Vec<Case>, CliError> {
     } else {
         args.scene.iter().map(String::as_str).collect()
     };
-    let mut cases = Vec::new();
+    let mut cases: Vec<Case> = Vec::new();
     for name in names {
         let known = FULL_LEAVES.iter().find(|(scene, _)| *scene == name);
         let leaves = match known {
@@ -48,12 +48,32 @@ fn cases(args: &CompareArgs) -> Result<Vec<Case>, CliError> {
         let alone = leaves.len() == 1;
         for leaf in leaves {
             let scene_args = SceneArgs { leaf, ..args.scene_args.clone() };
-            let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy();
-            let label = if alone { stem.into_owned() } else { format!("{stem}-{leaf}") };
-            cases.push(Case { named: Named::open(name, &scene_args)?, args: scene_args, label });
+            let named = Named::open(name, &scene_args)?;
+            let mut label = label(name, &named, &scene_args);
+            if !alone {
+                label += &format!("-{leaf}");
+            }
+            // Files of the same stem in two folders, or a scene named twice.
+            let (once, mut number) = (label.clone(), 1);
+            while cases.iter().any(|case| case.label == label) {
+                number += 1;
+                label = format!("{once}-{number}");
+            }
+            cases.push(Case { named, args: scene_args, label });
         }
     }
     Ok(cases)
+}
+
+/// What tells a scene from others in tables and file names: its name or the stem of its file, and the
+/// stem of the model it is made of. Letters that a file name or a CSV line might trip over go.
+fn label(name: &str, named: &Named, args: &SceneArgs) -> String {
+    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut label = stem(Path::new(name));
+    if let Some(mesh) = args.mesh.as_ref().filter(|_| named.takes_a_mesh()) {
+        label += &format!("-{}", stem(mesh));
+    }
+    label.replace(|c: char| !(c.is_alphanumeric() || "._-".contains(c)), "_")
 }
 
 /// The folder, made if it is not there.
@@ -107,7 +127,8 @@ pub(super) fn compare(
             );
             // Before any culler is measured, so that nobody can have chosen it by the outcome.
             let to = if args.json { &mut streams.talk } else { &mut streams.out };
-            writeln!(to, "{line}")
+            let width = streams.width.filter(|_| !args.json);
+            writeln!(to, "{}", wrapped(&line, width))
         });
         if finished.is_err() {
             bar.finish_and_clear();
@@ -154,7 +175,7 @@ fn tell_case(
         let said = if json {
             comparison.json_lines().join("\n")
         } else {
-            format!("\non {oracle}:\n{}", comparison.table())
+            format!("\non {oracle}:\n{}", comparison.table(streams.width))
         };
         bar.suspend(|| writeln!(streams.out, "{said}"))?;
         // Series and figures of the device where there is one: the last oracle.

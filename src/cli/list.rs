@@ -3,6 +3,7 @@
 use super::{CliError, EXIT_HELD, Streams};
 use crate::cull::CullerKind;
 use crate::index::INDEXES;
+use crate::oracle::CostModel;
 use crate::oracle::wgpu::{Gpu, NO_DEVICE};
 use crate::scene::generate::GENERATORS;
 
@@ -27,6 +28,10 @@ pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<
     ];
     section("oracles", oracles.iter().map(|&(name, summary)| pair(name, summary)).collect())?;
     section("indexes", INDEXES.iter().map(|i| pair(i.name, i.summary)).collect())?;
+    let models = [CostModel::lavapipe()];
+    let models = models.iter().map(|model| pair(&model.name, &model.source));
+    let file = pair("FILE.toml", "what `calibrate` measured and wrote");
+    section("cost models", models.chain([file]).collect())?;
     section("devices", devices().into_iter().map(|name| (name, String::new())).collect())?;
     Ok(EXIT_HELD)
 }

@@ -3,6 +3,7 @@
 //! `talk`.
 
 mod args;
+mod calibrate;
 mod compare;
 mod list;
 mod picture;
@@ -39,6 +40,8 @@ pub struct Streams<'a> {
     pub out: &'a mut dyn Write,
     /// Progress, warnings, failures' details.
     pub talk: &'a mut dyn Write,
+    /// Columns of the terminal that `out` is; `None` where it is none, and nothing is broken to fit.
+    pub width: Option<usize>,
 }
 
 /// Why a verb gave up.
@@ -98,6 +101,7 @@ pub fn main(
         args::Verb::Replay(args) => replay::replay(&args, cullers, &mut streams),
         args::Verb::Picture(args) => picture::picture(&args, cullers, &mut streams),
         args::Verb::Compare(args) => compare::compare(&args, cullers, &mut streams),
+        args::Verb::Calibrate(args) => calibrate::calibrate(&args, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),
     };
     done.unwrap_or_else(|error| {

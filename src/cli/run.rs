@@ -33,6 +33,11 @@ const DEFAULT_CULLERS: usize = 3;
 /// Set by Ctrl-C; a run looks at it after every frame of every lane.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
+/// Whether the user asked to stop.
+pub(super) fn interrupted() -> bool {
+    INTERRUPTED.load(Ordering::Relaxed)
+}
+
 /// The oracles of one invocation; the device is opened once.
 pub(super) struct Oracles {
     names: Vec<String>,
@@ -83,7 +88,7 @@ impl Oracles {
     }
 
     /// One oracle a name for `stage`, made anew for each lane; the geometry on the device is shared.
-    fn stage(&self, stage: &Stage) -> Result<StagedOracles<'_>, OracleError> {
+    pub(super) fn stage(&self, stage: &Stage) -> Result<StagedOracles<'_>, OracleError> {
         Ok(StagedOracles {
             names: &self.names,
             stage: stage.clone(),
@@ -97,14 +102,16 @@ fn on_device(name: &str) -> bool {
     Questions::of(name).is_some()
 }
 
-struct StagedOracles<'a> {
+/// The oracles of one invocation over one scene.
+pub(super) struct StagedOracles<'a> {
     names: &'a [String],
     stage: Stage,
     gpu: Option<Arc<GpuStage>>,
 }
 
 impl StagedOracles<'_> {
-    fn make(&self, name: &str) -> Result<Box<dyn Oracle>, OracleError> {
+    /// One of that name.
+    pub(super) fn make(&self, name: &str) -> Result<Box<dyn Oracle>, OracleError> {
         match name {
             "sim" => Ok(Box::new(Sim::new(self.stage.clone()))),
             "always" => Ok(Box::<Always>::default()),
@@ -153,6 +160,11 @@ impl Named {
     /// The scene of that name or file.
     pub(super) fn open(name: &str, args: &SceneArgs) -> Result<Self, CliError> {
         Ok(Self { name: name.to_owned(), scene: generate::open(name, &args.knobs())? })
+    }
+
+    /// Whether `--mesh` decides what is seen in it.
+    pub(super) fn takes_a_mesh(&self) -> bool {
+        self.scene.name == "bunnies" || self.scene.name.starts_with("model-")
     }
 
     /// The scene cut into parts; says what was wrong with files of the cache.

@@ -118,6 +118,13 @@ struct Drawn {
     work_ns: f64,
 }
 
+/// What to ask about, a run of the pool, and what that costs, its round trip apart.
+#[derive(Clone, Debug)]
+struct Question {
+    proxies: std::ops::Range<usize>,
+    price: f64,
+}
+
 /// What a frame spent and saved, in nanoseconds.
 #[derive(Clone, Copy, Debug, Default)]
 struct Account {
@@ -277,17 +284,19 @@ impl Adaptive {
         }
     }
 
-    /// How many boxes to ask about in the place of one.
-    fn most_boxes(&self, work_ns: f64) -> usize {
+    /// Puts what to ask about a node into the pool. As many boxes as cost no more than
+    /// [`TIGHTNESS`] of the work.
+    fn question(&mut self, view: &View<'_>, item: Item, proxy: Proxy, work_ns: f64) -> Question {
         let affordable = TIGHTNESS * work_ns / self.model.proxy_ns.max(f64::MIN_POSITIVE);
-        // Saturates; no part has so many.
-        affordable as usize
-    }
-
-    /// What a question about a node costs, its round trip apart.
-    fn price(&self, item: Item, work_ns: f64) -> f64 {
-        let boxes = self.scenery.box_count(item).min(self.most_boxes(work_ns)).max(1);
-        self.model.query_ns + self.model.proxy_ns * boxes as f64
+        let first = self.proxies.len();
+        // The cast saturates; no part has so many boxes.
+        let about = (proxy, affordable as usize);
+        self.scenery.tightest_proxies(view, item, about, &mut self.proxies);
+        let proxies = first..self.proxies.len();
+        let run = &self.proxies[proxies.clone()];
+        let pixels = run.iter().map(Proxy::pixels).sum();
+        let price = self.model.asking_ns(1, run.len() as u64, pixels);
+        Question { proxies, price }
     }
 
     /// The odds that a part drawn unasked is hidden: they grow with the frames since it was asked about
@@ -300,51 +309,45 @@ impl Adaptive {
     }
 
     /// Picks from `pending` what is to be asked about, the best first, as many as pay and the purse
-    /// holds; what is left stays. `None` where they do not pay for a round trip.
+    /// holds; what is left stays. `None` where they do not pay for a round trip; then all of them
+    /// stay pending.
     fn pick(&mut self, view: &View<'_>, pending: Vec<Pending>, due: bool) -> Option<Batch> {
-        let mut batch = Batch { asked: Vec::new(), due: Vec::new(), left: Vec::new() };
+        self.proxies.clear();
         let mut purse = self.account.purse() - self.model.trip_ns;
         let mut gain = -self.model.trip_ns;
-        let net = |culler: &mut Self, p: &Pending| {
-            culler.odds(p.kind).hidden() * p.work_ns - culler.price(p.item, p.work_ns)
-        };
-        let mut valued: Vec<(f64, Pending)> =
-            pending.into_iter().map(|p| (net(self, &p), p)).collect();
+        let mut valued: Vec<(f64, Question, Pending)> = Vec::with_capacity(pending.len());
+        for p in pending {
+            let question = self.question(view, p.item, p.proxy, p.work_ns);
+            let net = self.odds(p.kind).hidden() * p.work_ns - question.price;
+            valued.push((net, question, p));
+        }
         valued.sort_by(|a, b| b.0.total_cmp(&a.0));
-        for (net, pending) in valued {
-            let price = self.price(pending.item, pending.work_ns);
-            if net > 0.0 && price <= purse {
-                purse -= price;
+        let mut batch = Batch { asked: Vec::new(), due: Vec::new(), left: Vec::new() };
+        for (net, question, pending) in valued {
+            if net > 0.0 && question.price <= purse {
+                purse -= question.price;
                 gain += net;
-                batch.asked.push(pending);
+                batch.asked.push((question, pending));
             } else {
                 batch.left.push(pending);
             }
         }
-        for drawn in self.drawn.iter().filter(|_| due) {
-            let price = self.price(drawn.item, drawn.work_ns);
-            let net = self.odds_of_drawn(view, drawn.item) * drawn.work_ns - price;
-            if net > 0.0 && price <= purse {
-                purse -= price;
+        for place in 0..if due { self.drawn.len() } else { 0 } {
+            let drawn = self.drawn[place];
+            let question = self.question(view, drawn.item, drawn.proxy, drawn.work_ns);
+            let net = self.odds_of_drawn(view, drawn.item) * drawn.work_ns - question.price;
+            if net > 0.0 && question.price <= purse {
+                purse -= question.price;
                 gain += net;
-                batch.due.push(*drawn);
+                batch.due.push((question, drawn));
             }
         }
         if gain > 0.0 {
             return Some(batch);
         }
-        self.pending.append(&mut batch.asked);
+        self.pending.extend(batch.asked.into_iter().map(|(_, pending)| pending));
         self.pending.append(&mut batch.left);
         None
-    }
-
-    fn ask(&mut self, view: &View<'_>, pen: &mut Pen<'_>, about: (Item, Proxy, f64)) {
-        let (item, proxy, work_ns) = about;
-        self.proxies.clear();
-        let most = self.most_boxes(work_ns);
-        self.scenery.tightest_proxies(view, item, (proxy, most), &mut self.proxies);
-        self.account.asked += self.model.query_ns + self.model.proxy_ns * self.proxies.len() as f64;
-        pen.ask_any(&self.proxies);
     }
 
     /// One round trip.
@@ -354,13 +357,16 @@ impl Adaptive {
         pen: &mut Pen<'_>,
         batch: &Batch,
     ) -> Result<(), OracleError> {
-        batch.asked.iter().for_each(|p| self.ask(view, pen, (p.item, p.proxy, p.work_ns)));
-        batch.due.iter().for_each(|d| self.ask(view, pen, (d.item, d.proxy, d.work_ns)));
+        let questions = batch.asked.iter().map(|(question, _)| question);
+        for question in questions.chain(batch.due.iter().map(|(question, _)| question)) {
+            pen.ask_any(&self.proxies[question.proxies.clone()]);
+            self.account.asked += question.price;
+        }
         let mut answers = Vec::new();
         pen.round_trip(&mut answers)?;
         self.account.asked += self.model.trip_ns;
         let (first, later) = answers.split_at(batch.asked.len());
-        for (drawn, answer) in batch.due.iter().zip(later) {
+        for ((_, drawn), answer) in batch.due.iter().zip(later) {
             self.note(view, drawn.item, Kind::Shows, answer.visible);
             if answer.visible {
                 self.opened.show(drawn.place);
@@ -368,10 +374,10 @@ impl Adaptive {
         }
         if !batch.due.is_empty() {
             // Due were drawn: an answer "hidden" must not be overruled at the end of the frame.
-            let due: Vec<usize> = batch.due.iter().map(|drawn| drawn.place).collect();
+            let due: Vec<usize> = batch.due.iter().map(|(_, drawn)| drawn.place).collect();
             self.drawn.retain(|drawn| due.binary_search(&drawn.place).is_err());
         }
-        for (pending, answer) in batch.asked.iter().zip(first) {
+        for ((_, pending), answer) in batch.asked.iter().zip(first) {
             self.note(view, pending.item, pending.kind, answer.visible);
             if !answer.visible {
                 self.account.saved += pending.work_ns;
@@ -458,9 +464,9 @@ impl Adaptive {
 
 /// What goes to the device together.
 struct Batch {
-    asked: Vec<Pending>,
+    asked: Vec<(Question, Pending)>,
     /// Drawn parts, ascending by their places.
-    due: Vec<Drawn>,
+    due: Vec<(Question, Drawn)>,
     /// What is not asked about.
     left: Vec<Pending>,
 }

@@ -1,7 +1,7 @@
 //! The pen: what a culler draws and asks with. It hands everything on to the oracle and keeps the
 //! record that the trace is made of.
 
-use crate::oracle::{Answer, Oracle, OracleError, Proxy, QueryId};
+use crate::oracle::{Amounts, Answer, Oracle, OracleError, Proxy, QueryId};
 use crate::part::{PartId, Partition};
 
 /// What one frame cost.
@@ -11,12 +11,30 @@ pub struct Counts {
     pub queries: u64,
     /// Proxies in all questions; more than questions where some were asked about together.
     pub proxies: u64,
+    /// Samples of all rectangles asked about; one within two rectangles counts twice. A box counts
+    /// none: what it covers is known to the oracle alone. In no hash: the rectangles are.
+    pub pixels: u64,
     /// Triangles of the parts drawn.
     pub triangles: u64,
     /// Answers that were "visible".
     pub visible_answers: u64,
     /// Times the culler waited for answers.
     pub round_trips: u64,
+}
+
+impl Counts {
+    /// The work as a cost model weighs it, with the number of parts drawn.
+    #[must_use]
+    pub fn amounts(&self, parts: u64) -> Amounts {
+        Amounts {
+            parts,
+            triangles: self.triangles,
+            queries: self.queries,
+            proxies: self.proxies,
+            pixels: self.pixels,
+            trips: self.round_trips,
+        }
+    }
 }
 
 /// Draws, asks, and remembers.
@@ -67,6 +85,7 @@ impl<'a> Pen<'a> {
         let query = self.oracle.ask(proxies);
         self.note(2, u64::from(query.0));
         for proxy in proxies {
+            self.counts.pixels += proxy.pixels();
             if let Proxy::Rectangle { min, max, depth } = proxy {
                 self.note(3, u64::from(min[0]) << 32 | u64::from(min[1]));
                 self.note(3, u64::from(max[0]) << 32 | u64::from(max[1]));

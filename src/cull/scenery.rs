@@ -199,18 +199,6 @@ impl Scenery {
         sum
     }
 
-    /// How many boxes `tightest_proxies` asks about at most, a guess for inner nodes.
-    pub(super) fn box_count(&self, item: Item) -> usize {
-        match item {
-            Item::Object(object, node) if self.is_part(item) => {
-                let mesh = self.partition.mesh(object);
-                let part = mesh.tree.as_ref().map_or(0, |t| t.nodes[node as usize].first_part);
-                mesh.boxes_of(part).len()
-            }
-            _ => 1,
-        }
-    }
-
     /// Whether the node stands for one part.
     #[must_use]
     pub fn is_part(&self, item: Item) -> bool {

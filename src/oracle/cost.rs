@@ -1,6 +1,6 @@
 //! Cost models: what a frame's work costs a device, in nanoseconds of virtual time. Named models have
-//! their source beside them; others are read from calibration files, so that whoever uses one (an
-//! adaptive culler, the virtual clock) stays reproducible.
+//! their source beside them; others are read from the calibration files that `calibrate` writes, so
+//! that whoever uses one (an adaptive culler, the virtual clock) stays reproducible.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +22,9 @@ pub struct CostModel {
     pub query_ns: f64,
     /// A proxy asked about.
     pub proxy_ns: f64,
+    /// A sample of a rectangle asked about; a file without it prices none.
+    #[serde(default)]
+    pub pixel_ns: f64,
     /// Waiting for a batch of answers.
     pub trip_ns: f64,
 }
@@ -37,6 +40,8 @@ pub struct Amounts {
     pub queries: u64,
     /// Proxies in them.
     pub proxies: u64,
+    /// Samples of the rectangles among them; what a box covers is not known and counts none.
+    pub pixels: u64,
     /// Batches waited for.
     pub trips: u64,
 }
@@ -57,6 +62,7 @@ impl CostModel {
             triangle_ns: 95.0,
             query_ns: 10_000.0,
             proxy_ns: 4_000.0,
+            pixel_ns: 0.0,
             trip_ns: 300_000.0,
         }
     }
@@ -82,6 +88,7 @@ impl CostModel {
             ("triangle_ns", model.triangle_ns),
             ("query_ns", model.query_ns),
             ("proxy_ns", model.proxy_ns),
+            ("pixel_ns", model.pixel_ns),
             ("trip_ns", model.trip_ns),
         ];
         match figures.iter().find(|(_, figure)| !(figure.is_finite() && *figure >= 0.0)) {
@@ -98,11 +105,18 @@ impl CostModel {
         self.part_ns * parts as f64 + self.triangle_ns * triangles as f64
     }
 
+    /// Asking so many questions about so many proxies, of so many samples together, the waiting apart.
+    #[must_use]
+    pub fn asking_ns(&self, queries: u64, proxies: u64, pixels: u64) -> f64 {
+        self.query_ns * queries as f64
+            + self.proxy_ns * proxies as f64
+            + self.pixel_ns * pixels as f64
+    }
+
     /// A whole frame, rounded to a nanosecond.
     #[must_use]
     pub fn frame_total_ns(&self, work: Amounts) -> u64 {
-        let asking = self.query_ns * work.queries as f64
-            + self.proxy_ns * work.proxies as f64
+        let asking = self.asking_ns(work.queries, work.proxies, work.pixels)
             + self.trip_ns * work.trips as f64;
         (self.frame_ns + self.drawing_ns(work.parts, work.triangles) + asking).round() as u64
     }
@@ -114,9 +128,10 @@ mod tests {
 
     #[test]
     fn virtual_time_is_the_weighted_sum() {
-        let work = Amounts { parts: 2, triangles: 100, queries: 3, proxies: 5, trips: 1 };
-        let model = CostModel::lavapipe();
-        let by_hand = 500_000 + 2 * 2_000 + 100 * 95 + 3 * 10_000 + 5 * 4_000 + 300_000;
+        let work =
+            Amounts { parts: 2, triangles: 100, queries: 3, proxies: 5, pixels: 600, trips: 1 };
+        let model = CostModel { pixel_ns: 0.5, ..CostModel::lavapipe() };
+        let by_hand = 500_000 + 2 * 2_000 + 100 * 95 + 3 * 10_000 + 5 * 4_000 + 300 + 300_000;
         assert_eq!(model.frame_total_ns(work), by_hand);
     }
 
@@ -127,10 +142,15 @@ mod tests {
         let text = toml::to_string(&CostModel::lavapipe()).unwrap();
         std::fs::write(&path, &text).unwrap();
         assert_eq!(CostModel::open(path.to_str().unwrap()), Ok(CostModel::lavapipe()));
+        let older = text.replace("pixel_ns = 0.0\n", "");
+        assert_ne!(older, text);
+        std::fs::write(&path, older).unwrap();
+        assert_eq!(CostModel::open(path.to_str().unwrap()), Ok(CostModel::lavapipe()));
         for (from, to, says) in [
             ("95.0", "-1.0", "triangle_ns must be 0 or more, got -1"),
             ("95.0", "nan", "triangle_ns must be 0 or more, got NaN"),
             ("triangle_ns", "triangel_ns", "triangel_ns"),
+            ("pixel_ns", "pixle_ns", "pixle_ns"),
         ] {
             std::fs::write(&path, text.replace(from, to)).unwrap();
             let error = CostModel::open(path.to_str().unwrap()).unwrap_err();

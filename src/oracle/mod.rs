@@ -10,6 +10,7 @@
 
 mod always;
 mod cost;
+mod fit;
 #[cfg(feature = "hardware")]
 mod maxima;
 mod proxy_mesh;
@@ -27,6 +28,7 @@ use crate::scene::Viewport;
 
 pub use always::Always;
 pub use cost::{Amounts, CostModel};
+pub use fit::{FitError, Measurement};
 #[cfg(feature = "hardware")]
 use proxy_mesh::box_proxy_triangles;
 pub use residency::{Memory, MemoryKnobs, Residency, Step, least_budget, mesh_bytes};
@@ -63,6 +65,19 @@ pub enum Proxy {
         /// Largest corner, already inflated.
         max: [f32; 3],
     },
+}
+
+impl Proxy {
+    /// Samples that it covers; 0 for a box, whose fill is not known before it is projected.
+    #[must_use]
+    pub fn pixels(&self) -> u64 {
+        match self {
+            Self::Rectangle { min, max, .. } => {
+                u64::from(max[0] - min[0]) * u64::from(max[1] - min[1])
+            }
+            Self::Box { .. } => 0,
+        }
+    }
 }
 
 /// A question's number in its frame, counted from zero in asking order.

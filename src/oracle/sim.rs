@@ -150,6 +150,8 @@ impl Oracle for Sim {
     }
 
     fn submit(&mut self) -> Result<(), OracleError> {
+        // A device draws what it is sent: frames without questions are timed with their drawing too.
+        self.flush();
         self.submitted.push_back(std::mem::take(&mut self.open));
         Ok(())
     }

@@ -266,6 +266,7 @@ pub(super) fn decode(
             source_of_rank: sources,
             parts,
             drawable: Vec::new(),
+            boxes: Vec::new(),
             tree,
             bounds,
         },

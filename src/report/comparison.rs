@@ -4,6 +4,7 @@
 use serde_json::json;
 
 use super::chart::{Chart, Series};
+use super::columns::{Column, Columns, wrapped};
 use super::memory::{CSV_HEAD, MemoryFigures, memory_table};
 use crate::oracle::CostModel;
 use crate::run::{FrameTrace, Trace};
@@ -88,56 +89,65 @@ impl Comparison<'_> {
             triangle_ns: row.ms * 1e6 / triangles.max(1.0),
             query_ns: 0.0,
             proxy_ns: 0.0,
+            pixel_ns: 0.0,
             trip_ns: (3168.0 - 3836.0 * 2584.0 / 22344.0) * 1e6 / 14408.0,
         })
     }
 
-    /// The table with the ratios below it.
+    /// The table with the ratios below it, for a terminal of `width` columns; `None` is as wide as it
+    /// gets.
     #[must_use]
-    pub fn table(&self) -> String {
-        let radeon = self.radeon9500();
-        let mut text = format!(
-            "{:<16} {:>9} {:>9} {:>9} {:>8} | {:>9} {:>8} | {:>9} {:>8} | {:>7} {:>11}\n",
-            self.label,
-            "wall ms",
-            "virtual",
-            "radeon",
-            "paper",
-            "parts",
-            "paper",
-            "queries",
-            "paper",
-            "trips",
-            "triangles"
-        );
-        for trace in self.traces {
-            let row = paper(self.scene, &trace.lane.culler);
-            let of = |figure: &dyn Fn(Published) -> f64| {
-                row.map_or_else(|| "-".to_owned(), |row| format!("{:.0}", figure(row)))
-            };
-            let virtual_ms =
-                |model: &CostModel| mean(trace, |f| model.frame_total_ns(f.amounts()) as f64 / 1e6);
-            text += &format!(
-                "{:<16} {:>9.1} {:>9.1} {:>9} {:>8} | {:>9.1} {:>8} | {:>9.1} {:>8} | {:>7.1} {:>11.0}\n",
-                trace.lane.culler,
-                mean(trace, wall_ms),
-                virtual_ms(self.model),
-                radeon.as_ref().map_or("-".to_owned(), |m| format!("{:.0}", virtual_ms(m))),
-                of(&|row| row.ms),
-                mean(trace, |f| f64::from(f.drawn_parts)),
-                of(&|row| row.parts),
-                mean(trace, |f| f.counts.queries as f64),
-                of(&|row| row.queries),
-                mean(trace, |f| f.counts.round_trips as f64),
-                mean(trace, |f| f.counts.triangles as f64),
-            );
-        }
+    pub fn table(&self, width: Option<usize>) -> String {
         let memory = |trace: &Trace| {
             let figures = MemoryFigures::of(&trace.frames);
             (trace.lane.culler.clone(), trace.frames.len(), figures)
         };
-        text += &memory_table(&self.traces.iter().map(memory).collect::<Vec<_>>());
-        text + &self.ratios()
+        let memory = memory_table(&self.traces.iter().map(memory).collect::<Vec<_>>());
+        self.columns().text(width) + &memory + &wrapped(&self.ratios(), width)
+    }
+
+    fn columns(&self) -> Columns {
+        let radeon = self.radeon9500();
+        let column = |head: &'static str, least: usize, cell: &dyn Fn(&Trace) -> String| Column {
+            head: (head, least),
+            cells: self.traces.iter().map(cell).collect(),
+        };
+        let of = |trace: &Trace, figure: &dyn Fn(Published) -> f64| {
+            let row = paper(self.scene, &trace.lane.culler);
+            row.map_or_else(|| "-".to_owned(), |row| format!("{:.0}", figure(row)))
+        };
+        let virtual_ms = |trace: &Trace, model: &CostModel| {
+            mean(trace, |f| model.frame_total_ns(f.amounts()) as f64 / 1e6)
+        };
+        let tenths = |figure: f64| format!("{figure:.1}");
+        let modelled = |t: &Trace| {
+            radeon.as_ref().map_or("-".to_owned(), |m| format!("{:.0}", virtual_ms(t, m)))
+        };
+        let triangles = |t: &Trace| format!("{:.0}", mean(t, |f| f.counts.triangles as f64));
+        Columns {
+            head: (self.label.to_owned(), 16),
+            names: self.traces.iter().map(|trace| trace.lane.culler.clone()).collect(),
+            groups: vec![
+                vec![
+                    column("wall ms", 9, &|t| tenths(mean(t, wall_ms))),
+                    column("virtual", 9, &|t| tenths(virtual_ms(t, self.model))),
+                    column("radeon", 9, &modelled),
+                    column("paper", 8, &|t| of(t, &|row| row.ms)),
+                ],
+                vec![
+                    column("parts", 9, &|t| tenths(mean(t, |f| f64::from(f.drawn_parts)))),
+                    column("paper", 8, &|t| of(t, &|row| row.parts)),
+                ],
+                vec![
+                    column("queries", 9, &|t| tenths(mean(t, |f| f.counts.queries as f64))),
+                    column("paper", 8, &|t| of(t, &|row| row.queries)),
+                ],
+                vec![
+                    column("trips", 7, &|t| tenths(mean(t, |f| f.counts.round_trips as f64))),
+                    column("triangles", 11, &triangles),
+                ],
+            ],
+        }
     }
 
     /// One JSON object a lane: means per frame, beside the paper's where it has the row.
@@ -163,6 +173,7 @@ impl Comparison<'_> {
                 "visible_triangles": mean(trace, |f| f.visible_triangles as f64),
                 "queries": mean(trace, |f| f.counts.queries as f64),
                 "proxies": mean(trace, |f| f.counts.proxies as f64),
+                "pixels": mean(trace, |f| f.counts.pixels as f64),
                 "round_trips": mean(trace, |f| f.counts.round_trips as f64),
                 "paper_ms": row.map(|r| r.ms),
                 "paper_parts": row.map(|r| r.parts),
@@ -263,14 +274,14 @@ impl Comparison<'_> {
     pub fn csv(&self) -> String {
         let limited = self.traces.iter().any(|t| t.frames.iter().any(|f| f.memory.is_some()));
         let mut text = String::from(
-            "scene,culler,frame,wall_ms,virtual_ms,parts,triangles,visible_parts,visible_triangles,queries,proxies,round_trips",
+            "scene,culler,frame,wall_ms,virtual_ms,parts,triangles,visible_parts,visible_triangles,queries,proxies,pixels,round_trips",
         );
         text += if limited { CSV_HEAD } else { "" };
         text.push('\n');
         for trace in self.traces {
             for f in &trace.frames {
                 text += &format!(
-                    "{},{},{},{:.3},{:.3},{},{},{},{},{},{},{}{}\n",
+                    "{},{},{},{:.3},{:.3},{},{},{},{},{},{},{},{}{}\n",
                     self.label,
                     trace.lane.culler,
                     f.frame,
@@ -282,6 +293,7 @@ impl Comparison<'_> {
                     f.visible_triangles,
                     f.counts.queries,
                     f.counts.proxies,
+                    f.counts.pixels,
                     f.counts.round_trips,
                     f.memory.as_ref().map_or_else(String::new, MemoryFigures::csv)
                 );

@@ -2,12 +2,14 @@
 //! gates; they decide nothing.
 
 mod chart;
+mod columns;
 mod comparison;
 mod memory;
 mod picture;
 mod row;
 
 pub use chart::{Chart, Series};
+pub use columns::wrapped;
 pub use comparison::{Comparison, Published, TABLE_1};
 pub use memory::MemoryFigures;
 pub use picture::{Shown, depth_picture, part_picture, picture_png, top_view};

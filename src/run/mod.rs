@@ -2,11 +2,13 @@
 //! that run side by side; each finished frame is handed to the lane's observers and then forgotten.
 //! It must not know the checks: an observer is anything that implements [`Observer`].
 
+mod calibrate;
 mod frame;
 mod lane;
 mod trace;
 mod truth;
 
+pub use calibrate::{Bench, CalibrationKnobs, Workload, frames_to_measure, measure, workloads};
 pub use frame::{FrameState, World};
 pub use lane::{Lane, LaneInfo, Observer, RunError, run};
 pub use trace::{DeviceImages, FrameRecord, FrameTrace, Trace};

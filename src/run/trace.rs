@@ -85,13 +85,7 @@ impl FrameTrace {
     /// The work as a cost model weighs it.
     #[must_use]
     pub fn amounts(&self) -> Amounts {
-        Amounts {
-            parts: u64::from(self.drawn_parts),
-            triangles: self.counts.triangles,
-            queries: self.counts.queries,
-            proxies: self.counts.proxies,
-            trips: self.counts.round_trips,
-        }
+        self.counts.amounts(u64::from(self.drawn_parts))
     }
 
     /// Adds what must repeat of this frame to `hash`.

@@ -48,7 +48,7 @@ const BROKEN: &[CullerKind] =
 fn run(line: &str) -> (u8, String, String) {
     let (mut out, mut talk) = (Vec::new(), Vec::new());
     let args = line.split(' ').map(Into::into);
-    let code = main(args, BROKEN, Streams { out: &mut out, talk: &mut talk });
+    let code = main(args, BROKEN, Streams { out: &mut out, talk: &mut talk, width: None });
     (code, String::from_utf8(out).unwrap(), String::from_utf8(talk).unwrap())
 }
 

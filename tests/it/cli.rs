@@ -2,13 +2,15 @@
 
 use assert_cmd::Command;
 
-fn plainsight(args: &[&str]) -> (i32, String, String) {
+/// Exit code, standard output and standard error of the program.
+pub(crate) fn plainsight(args: &[&str]) -> (i32, String, String) {
     let output = Command::cargo_bin("plainsight").unwrap().args(args).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
 
-const SMALL: [&str; 8] =
+/// Flags that make any scene small enough for debug builds.
+pub(crate) const SMALL: [&str; 8] =
     ["--scale", "0.02", "--frames", "3", "--viewport", "160x120", "--leaf", "256"];
 
 fn run(more: &[&str]) -> (i32, String, String) {

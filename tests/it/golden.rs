@@ -17,7 +17,7 @@ fn compare(name: &str, scene: &str, layer: &str) {
     );
     let args = line.split(' ').map(Into::into).chain([made.clone().into_os_string()]);
     let (mut out, mut talk) = (Vec::new(), Vec::new());
-    let code = main(args, CULLERS, Streams { out: &mut out, talk: &mut talk });
+    let code = main(args, CULLERS, Streams { out: &mut out, talk: &mut talk, width: None });
     assert_eq!(code, EXIT_HELD, "{}", String::from_utf8_lossy(&talk));
     if std::env::var_os("PLAINSIGHT_WRITE_GOLDEN").is_some() {
         std::fs::copy(&made, &golden).unwrap();

@@ -3,8 +3,10 @@
 
 mod broken;
 mod cache;
+mod calibrate;
 mod cli;
 mod common;
+mod compare;
 mod determinism;
 mod golden;
 mod held;

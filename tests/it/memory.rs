@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use plainsight::cull::{CULLERS, CullerKind, ProxyKind};
 use plainsight::index::INDEXES;
-use plainsight::oracle::wgpu::{GpuStage, Hardware, Questions};
+use plainsight::oracle::wgpu::{GpuStage, Hardware};
 use plainsight::oracle::{
-    FrameView, Memory, MemoryKnobs, Oracle, OracleError, Proxy, Residency, Sim, Stage, Step,
-    least_budget, mesh_bytes,
+    FrameView, Memory, MemoryKnobs, Oracle, OracleError, Proxy, Questions, Residency, Sim, Stage,
+    Step, least_budget, mesh_bytes,
 };
 use plainsight::part::{PartId, Partition, PartitionKnobs};
 use plainsight::run::{FrameTrace, Trace, World};

@@ -1,4 +1,5 @@
 //! `model`: an imported model as it is, each of its groups an object; nothing moves but the camera.
+//! The scene is called `model-` and the stem of the file, so that reports tell models apart.
 //! `--scale` repeats it: scale 2 puts a second copy beside the first, and so on.
 
 use std::sync::Arc;
@@ -28,7 +29,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         })
         .collect();
     Ok(Scene {
-        name: "model".to_owned(),
+        name: format!("model-{}", path.file_stem().unwrap_or_default().to_string_lossy()),
         seed: chosen.seed,
         meshes: meshes.into_iter().map(Arc::new).collect(),
         objects,
