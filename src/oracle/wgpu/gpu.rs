@@ -62,8 +62,12 @@ impl Gpu {
                 _ => NO_DEVICE.to_owned(),
             }));
         };
-        let descriptor =
-            wgpu::DeviceDescriptor { required_limits: chosen.limits(), ..Default::default() };
+        let descriptor = wgpu::DeviceDescriptor {
+            // Objects' matrices; every Vulkan device has them (push constants).
+            required_features: wgpu::Features::IMMEDIATES,
+            required_limits: chosen.limits(),
+            ..Default::default()
+        };
         let (device, queue) = pollster::block_on(chosen.request_device(&descriptor))
             .map_err(|error| OracleError::NoDevice(format!("{}: {error}", describe(chosen))))?;
         let trouble = Arc::new(Mutex::new(None));

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::images::Images;
 use super::pyramid::{Ask, Pyramid};
 use super::read_back::{DepthReader, MOST_COPIES};
-use super::stage::{GpuParts, GpuStage};
+use super::stage::{DrawnObject, GpuParts, GpuStage};
 use crate::oracle::{
     Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, Questions, ReadBack, Residency,
     Step, box_proxy_triangles,
@@ -100,8 +100,8 @@ pub struct Hardware {
     stage: Arc<GpuStage>,
     images: Images,
     redraw_images: Option<Images>,
-    matrices: wgpu::Buffer,
-    bindings: wgpu::BindGroup,
+    /// Clip from each object.
+    matrices: Vec<[f32; 16]>,
     cleared: bool,
     asked: u32,
     events: Vec<Event>,
@@ -131,22 +131,6 @@ impl Hardware {
     /// # Panics
     /// Where the stage has not enough memory for its largest mesh.
     pub fn new(stage: &Arc<GpuStage>, questions: Questions) -> Result<Self, OracleError> {
-        let device = &stage.gpu.device;
-        let objects = u64::from(stage.stage.partition.object_count().max(1));
-        let matrices = device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: objects * 64,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &stage.layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: matrices.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: stage.first_part.as_entire_binding() },
-            ],
-        });
         let images = Images::new(&stage.gpu, stage.stage.viewport, false);
         let pyramid = (questions == Questions::Pyramid)
             .then(|| Pyramid::new(&stage.gpu, stage.stage.viewport));
@@ -162,8 +146,7 @@ impl Hardware {
             stage: Arc::clone(stage),
             images,
             redraw_images: None,
-            matrices,
-            bindings,
+            matrices: Vec::new(),
             cleared: false,
             asked: 0,
             events: Vec::new(),
@@ -183,6 +166,15 @@ impl Hardware {
 
     fn encoder(&self) -> wgpu::CommandEncoder {
         self.stage.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    }
+
+    /// What the shader is told of an object.
+    fn drawn_object(&self, object: ObjectId) -> DrawnObject {
+        DrawnObject {
+            clip_from_object: self.matrices[object.0 as usize],
+            first_part: self.stage.stage.partition.first_part(object).0,
+            padding: [0; 3],
+        }
     }
 
     /// The buffers that parts of a mesh are drawn from.
@@ -493,26 +485,25 @@ impl Hardware {
             occlusion_query_set: slot.map(|(slot, set)| &slot.queries[set]),
             ..Default::default()
         });
-        pass.set_bind_group(0, &self.bindings, &[]);
         let mut queries = 0;
-        let mut drawing: Option<u32> = None;
+        let mut drawing: Option<ObjectId> = None;
         for (place, event) in self.events.iter().enumerate().skip(from) {
             match *event {
                 Event::Draw(part) => {
                     let partition = &self.stage.stage.partition;
                     let (object, local) = partition.locate(part);
-                    let number = partition.mesh_index(object);
-                    if drawing != Some(number) {
-                        let mesh = self.parts(number);
+                    if drawing != Some(object) {
+                        let mesh = self.parts(partition.mesh_index(object));
                         pass.set_pipeline(&self.stage.draw);
+                        pass.set_immediates(0, bytemuck::bytes_of(&self.drawn_object(object)));
                         pass.set_vertex_buffer(0, mesh.vertices.slice(..));
                         pass.set_index_buffer(mesh.by_part.slice(..), wgpu::IndexFormat::Uint32);
-                        drawing = Some(number);
+                        drawing = Some(object);
                     }
                     let this = &partition.mesh(object).parts[local as usize];
                     let first = this.first_triangle * 3;
                     let indices = first..first + this.triangle_count * 3;
-                    pass.draw_indexed(indices, this.first_vertex as i32, object.0..object.0 + 1);
+                    pass.draw_indexed(indices, this.first_vertex as i32, 0..1);
                 }
                 Event::AskPyramid { .. } => return place,
                 Event::Ask { first_vertex, end_vertex } => {
@@ -583,13 +574,13 @@ impl Hardware {
             ..Default::default()
         });
         pass.set_pipeline(&self.stage.draw_ids);
-        pass.set_bind_group(0, &self.bindings, &[]);
         for (object, run, whole) in runs {
             let mesh = &self.stage.meshes[partition.mesh_index(object) as usize];
             pass.set_vertex_buffer(0, mesh.parts.vertices.slice(..));
             let from = if whole { &mesh.by_rank } else { &indices };
             pass.set_index_buffer(from.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(run, 0, object.0..object.0 + 1);
+            pass.set_immediates(0, bytemuck::bytes_of(&self.drawn_object(object)));
+            pass.draw_indexed(run, 0, 0..1);
         }
     }
 }
@@ -645,8 +636,8 @@ impl Oracle for Hardware {
             limited.residency.begin_frame(view, &mut steps);
             self.carry_out(&steps)?;
         }
-        let matrices = bytemuck::cast_slice(view.clip_from_object);
-        self.stage.gpu.queue.write_buffer(&self.matrices, 0, matrices);
+        self.matrices.clear();
+        self.matrices.extend_from_slice(view.clip_from_object);
         self.cleared = false;
         self.asked = 0;
         self.events.clear();

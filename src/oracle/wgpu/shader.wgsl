@@ -1,22 +1,32 @@
 // The raster rules' vertex transform in its written order, and proxies that come in clip space.
 
-@group(0) @binding(0) var<storage, read> clip_from_object: array<mat4x4<f32>>;
-@group(0) @binding(1) var<storage, read> first_part: array<u32>;
+struct Object {
+    clip_from_object: mat4x4<f32>,
+    first_part: u32,
+}
+
+// Immediate, not in a buffer: per vertex lavapipe would check and gather each element of it.
+var<immediate> object: Object;
 
 struct Varying {
     @invariant @builtin(position) position: vec4<f32>,
     @location(0) @interpolate(flat, either) part: u32,
 }
 
+fn transformed(p: vec3<f32>) -> vec4<f32> {
+    let m = object.clip_from_object;
+    return ((m[0] * p.x + m[1] * p.y) + m[2] * p.z) + m[3];
+}
+
+// Where depth alone is drawn.
 @vertex
-fn part_vertex(
-    @location(0) p: vec3<f32>,
-    @location(1) local_part: u32,
-    @builtin(instance_index) object: u32,
-) -> Varying {
-    let m = clip_from_object[object];
-    let position = ((m[0] * p.x + m[1] * p.y) + m[2] * p.z) + m[3];
-    return Varying(position, first_part[object] + local_part + 1u);
+fn depth_vertex(@location(0) p: vec3<f32>) -> @invariant @builtin(position) vec4<f32> {
+    return transformed(p);
+}
+
+@vertex
+fn part_vertex(@location(0) p: vec3<f32>, @location(1) local_part: u32) -> Varying {
+    return Varying(transformed(p), object.first_part + local_part + 1u);
 }
 
 @fragment

@@ -8,7 +8,7 @@ use wgpu::util::DeviceExt;
 use super::gpu::Gpu;
 use super::pyramid;
 use crate::oracle::{OracleError, Stage};
-use crate::part::{ObjectId, PartedMesh};
+use crate::part::PartedMesh;
 
 /// Depth of every target.
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -22,6 +22,17 @@ pub(super) const IDS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 struct Vertex {
     position: [f32; 3],
     part: u32,
+}
+
+/// What the shader is told of an object before its parts are drawn.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(super) struct DrawnObject {
+    /// Column-major.
+    pub(super) clip_from_object: [f32; 16],
+    pub(super) first_part: u32,
+    /// The size of the structure is a multiple of 16 bytes.
+    pub(super) padding: [u32; 3],
 }
 
 /// What drawing the parts of a mesh takes.
@@ -67,8 +78,6 @@ pub struct GpuStage {
     pub(super) gpu: Arc<Gpu>,
     pub(super) stage: Stage,
     pub(super) meshes: Vec<GpuMesh>,
-    pub(super) first_part: wgpu::Buffer,
-    pub(super) layout: wgpu::BindGroupLayout,
     /// Less, writes depth.
     pub(super) draw: wgpu::RenderPipeline,
     /// Less, writes depth and part ids.
@@ -92,37 +101,15 @@ impl GpuStage {
             return Err(OracleError::Lost(what));
         }
         let meshes = stage.partition.meshes().iter().map(|mesh| upload(device, mesh)).collect();
-        let objects = 0..stage.partition.object_count();
-        let mut firsts: Vec<u32> =
-            objects.map(|object| stage.partition.first_part(ObjectId(object)).0).collect();
-        // A binding may not be empty.
-        firsts.resize(firsts.len().max(1), 0);
-        let first_part = buffer(device, bytemuck::cast_slice(&firsts), wgpu::BufferUsages::STORAGE);
-        let storage = |binding| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::VERTEX,
-            ty: wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Storage { read_only: true },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: None,
-            entries: &[storage(0), storage(1)],
-        });
-        let pipelines = Pipelines::new(device, &layout);
+        let pipelines = Pipelines::new(device);
         let made = Arc::new(Self {
             gpu: Arc::clone(gpu),
             stage: stage.clone(),
             meshes,
-            first_part,
             draw: pipelines.part(None),
             draw_ids: pipelines.part(Some(IDS)),
             ask: pipelines.proxy(),
             pyramid: pyramid::Pipelines::new(device),
-            layout,
         });
         gpu.wait(None)?;
         Ok(made)
@@ -157,12 +144,12 @@ struct Pipelines<'a> {
 }
 
 impl<'a> Pipelines<'a> {
-    fn new(device: &'a wgpu::Device, bindings: &wgpu::BindGroupLayout) -> Self {
+    fn new(device: &'a wgpu::Device) -> Self {
         let shader = device.create_shader_module(wgpu::include_wgsl!("shader.wgsl"));
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: None,
-            bind_group_layouts: &[Some(bindings)],
-            immediate_size: 0,
+            bind_group_layouts: &[],
+            immediate_size: size_of::<DrawnObject>() as u32,
         });
         Self { device, shader, layout }
     }
@@ -174,7 +161,8 @@ impl<'a> Pipelines<'a> {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &attributes,
         };
-        self.build("part_vertex", vertices, ids, (wgpu::CompareFunction::Less, true))
+        let entry = if ids.is_some() { "part_vertex" } else { "depth_vertex" };
+        self.build(entry, vertices, ids, (wgpu::CompareFunction::Less, true))
     }
 
     fn proxy(&self) -> wgpu::RenderPipeline {
