@@ -7,13 +7,15 @@ use crate::cull::{Culler, CullerSetup, ProxyKind};
 use crate::index::INDEXES;
 use crate::oracle::{CostModel, Oracle, Sim};
 use crate::part::PartitionKnobs;
-use crate::run::{self, FrameRecord, FrameTrace, Lane, LaneInfo, Observer, RunError, Trace, World};
+use crate::run::{
+    self, FrameRecord, FrameTrace, Lane, LaneInfo, Observer, Repeat, RunError, Trace, World,
+};
 use crate::scene::Scene;
 
 /// Misses named in full before the rest is only counted.
 const NAMED_MISSES: usize = 8;
-/// Frames that [`judge`] runs a second time.
-const REPEATED_FRAMES: u32 = 2;
+/// What [`judge`] runs a second time.
+const REPEAT: Repeat = Repeat::first(2);
 
 /// Every check of one lane.
 #[derive(Default)]
@@ -144,8 +146,9 @@ pub fn judge(
     let replay = format!("scene {} seed {} culler {name}", world.scene.name, world.scene.seed);
     let info = LaneInfo { culler: name, oracle: oracle.name(), device: None, replay };
     let mut gate = Gate::default();
-    let lane = Lane { info, culler: Box::new(culler), oracle, observer: &mut gate };
-    let mut traces = run::run(&world, frames, REPEATED_FRAMES, &mut [lane], &mut || true)?;
+    let (culler, observer) = (Box::new(culler), &mut gate);
+    let lane = Lane { info, culler, oracle, observer, with_bound: false };
+    let mut traces = run::run(&world, frames, REPEAT, &mut [lane], &mut || true)?;
     let trace = traces.pop().expect("one lane leaves one trace");
     Ok(Verdict { trace, gate })
 }

@@ -93,8 +93,8 @@ pub(super) struct SceneArgs {
     /// What is asked about in the place of geometry.
     #[arg(long, value_enum, default_value_t = ProxyArg::Rectangle)]
     pub(super) proxy: ProxyArg,
-    /// What work costs the device, for adaptive cullers and virtual time: lavapipe, or a file that
-    /// `calibrate` wrote.
+    /// What work costs the device, for adaptive cullers and virtual time: lavapipe, lavapipe-read-back,
+    /// or a file that `calibrate` wrote.
     #[arg(long, value_name = "NAME|FILE.toml", default_value = "lavapipe")]
     pub(super) cost: String,
     /// Out of core: the MiB of geometry that each lane's device may hold (default: all of it).
@@ -125,7 +125,7 @@ pub(super) struct RunArgs {
     /// Scenes by name, or scene files (default: bunnies city rooms soup).
     #[arg(long, value_name = "NAME|FILE.toml", num_args = 1.., value_delimiter = ',')]
     pub(super) scene: Vec<String>,
-    /// Cullers (default: full simple vfc).
+    /// Cullers (default: full full-adaptive full-seldom full-trusting simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
     /// Oracles: sim, hardware, pyramid, read-back, always (default: sim, and hardware where a Vulkan device is found).
@@ -146,7 +146,7 @@ pub(super) struct CompareArgs {
     /// Scenes by name, or scene files (default: powerplant bunnies).
     #[arg(long, value_name = "NAME|FILE.toml", num_args = 1.., value_delimiter = ',')]
     pub(super) scene: Vec<String>,
-    /// Cullers (default: full simple vfc).
+    /// Cullers (default: full full-adaptive full-seldom full-trusting simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
     /// Oracles: sim, hardware, pyramid, read-back, always (default: sim, and hardware where a Vulkan device is found).
@@ -159,6 +159,9 @@ pub(super) struct CompareArgs {
     pub(super) leaves: Vec<u32>,
     #[command(flatten)]
     pub(super) scene_args: SceneArgs,
+    /// How often everything is run, the cullers in turn; wall times are the medians.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) rounds: u32,
     /// One JSON object a lane on standard output in place of the tables.
     #[arg(long)]
     pub(super) json: bool,

@@ -28,7 +28,7 @@ pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<
     ];
     section("oracles", oracles.iter().map(|&(name, summary)| pair(name, summary)).collect())?;
     section("indexes", INDEXES.iter().map(|i| pair(i.name, i.summary)).collect())?;
-    let models = [CostModel::lavapipe()];
+    let models = CostModel::named();
     let models = models.iter().map(|model| pair(&model.name, &model.source));
     let file = pair("FILE.toml", "what `calibrate` measured and wrote");
     section("cost models", models.chain([file]).collect())?;

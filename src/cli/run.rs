@@ -16,12 +16,13 @@ use crate::oracle::{Always, CostModel, Oracle, OracleError, Questions, Sim, Stag
 use crate::part::{Cache, PartId};
 use crate::report::{Row, table};
 use crate::run::{
-    FrameRecord, Lane, LaneInfo, Observer, Trace, World, partition_difference, run as run_lanes,
+    FrameRecord, Lane, LaneInfo, Observer, Repeat, Trace, World, partition_difference,
+    run as run_lanes,
 };
 use crate::scene::{Scene, generate};
 
-/// Frames that are run a second time to see that they repeat.
-const REPEATED_FRAMES: u32 = 1;
+/// What is run a second time to see that it repeats.
+pub(super) const REPEAT: Repeat = Repeat::first(1);
 /// The scenes of the default run.
 const DEFAULT_SCENES: [&str; 4] = ["bunnies", "city", "rooms", "soup"];
 /// Frames of the default run: 24 at full size take over two minutes on two cores, and the default
@@ -218,6 +219,9 @@ pub(super) struct Plan<'a> {
     pub(super) cost: CostModel,
     /// Where cut meshes are kept, if anywhere.
     pub(super) cache: Option<Cache>,
+    pub(super) repeat: Repeat,
+    /// Whether each device is measured as well on the visible parts alone.
+    pub(super) with_bound: bool,
     pub(super) args: &'a SceneArgs,
 }
 
@@ -264,8 +268,9 @@ impl Plan<'_> {
             .flat_map(|oracle| self.cullers.iter().map(move |&culler| (oracle.as_str(), culler)))
             .collect();
         gates.resize_with(lanes.len(), Gate::default);
-        bar.inc_length(u64::from(frames) * lanes.len() as u64);
-        let mut running = Vec::new();
+        let shots = u64::from(frames) + self.repeat.total(frames);
+        bar.inc_length(shots * lanes.len() as u64);
+        let mut running: Vec<Lane<'_>> = Vec::new();
         for (&(oracle, kind), gate) in lanes.iter().zip(&mut gates) {
             let oracle = staged.make(oracle)?;
             let info = LaneInfo {
@@ -275,14 +280,16 @@ impl Plan<'_> {
                 replay: self.replay_line(name, &world, kind.name, oracle.name()),
             };
             let culler = self.factory(kind, &world, &entries);
-            running.push(Lane { info, culler, oracle, observer: gate });
+            let first = running.iter().all(|lane| lane.info.oracle != info.oracle);
+            let with_bound = self.with_bound && first;
+            running.push(Lane { info, culler, oracle, observer: gate, with_bound });
         }
         bar.set_message(name.clone());
         let mut tick = || {
             bar.inc(1);
             !INTERRUPTED.load(Ordering::Relaxed)
         };
-        let traces = run_lanes(&world, frames, REPEATED_FRAMES, &mut running, &mut tick)?;
+        let traces = run_lanes(&world, frames, self.repeat, &mut running, &mut tick)?;
         drop(running);
         Ok(Finished { world, traces, gates })
     }
@@ -306,13 +313,13 @@ impl Plan<'_> {
             replay: String::new(),
         };
         let culler = self.factory(self.cullers[0], world, &entries);
-        let lane = Lane { info, culler, oracle, observer: &mut seen };
+        let lane = Lane { info, culler, oracle, observer: &mut seen, with_bound: false };
         bar.inc_length(u64::from(last) + 1);
         let mut tick = || {
             bar.inc(1);
             !INTERRUPTED.load(Ordering::Relaxed)
         };
-        run_lanes(world, last + 1, 0, &mut [lane], &mut tick)?;
+        run_lanes(world, last + 1, Repeat::NONE, &mut [lane], &mut tick)?;
         Ok(seen.0)
     }
 
@@ -381,6 +388,8 @@ pub(super) fn run(
         cost,
         cache: pick_cache(&scene_args)?,
         oracles: Oracles::open(&args.oracle, adapter, streams)?,
+        repeat: REPEAT,
+        with_bound: false,
         args: &scene_args,
     };
     catch_interrupt();
@@ -484,5 +493,6 @@ pub(super) fn one_lane<'a>(
     let named = Named::open(scene, args)?;
     let (cost, cache) = (pick_cost(args)?, pick_cache(args)?);
     let oracles = Oracles::open(oracle, args.adapter.as_deref(), streams)?;
-    Ok((Plan { cullers: chosen, index, oracles, cost, cache, args }, named))
+    let (cullers, repeat) = (chosen, REPEAT);
+    Ok((Plan { cullers, index, oracles, cost, cache, repeat, with_bound: false, args }, named))
 }

@@ -9,10 +9,10 @@ pub fn chance_of_staying_hidden(frames: u32) -> f64 {
     0.99 - 0.7 * libm::exp(-f64::from(frames))
 }
 
-/// Cuts `chances`, sorted so that the largest come first, into runs to ask about together: each run
-/// grows while that raises its value, nodes saved ÷ expected questions, where a run of n questions
-/// costs 1, and n more with the chance that any of them shows. Returns the ends of the runs; a run
-/// never has more than `most`.
+/// Cuts `chances` into runs to ask about together: each run grows while that raises its value, nodes
+/// saved ÷ expected questions, where a run of n questions costs 1, and n more with the chance that any
+/// of them shows. Returns the ends of the runs; a run never has more than `most`. Either the surest
+/// come first, as in the paper, or neighbours stand together: they come into view together.
 #[must_use]
 pub fn runs(chances: &[f64], most: usize) -> Vec<usize> {
     let mut ends = Vec::new();

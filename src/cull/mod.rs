@@ -9,6 +9,7 @@ mod draw_all;
 mod full;
 mod full_waits;
 pub mod group;
+mod layers;
 mod opened;
 mod pen;
 mod postponement;
@@ -27,7 +28,7 @@ pub use adaptive::Adaptive;
 pub use chc::Chc;
 pub use chc_plus::ChcPlus;
 pub use draw_all::DrawAll;
-pub use full::{Full, FullKnobs};
+pub use full::{AfterGroup, Full, FullKnobs};
 pub use full_waits::{FullWaits, FullWaitsKnobs};
 pub use pen::{Counts, Pen};
 pub use postponement::Postponement;
@@ -117,6 +118,18 @@ pub const CULLERS: &[CullerKind] = &[
         summary: "the same, weighing every question by a cost model (--cost): never far over vfc",
         asks: true,
         make: |setup| Box::new(Adaptive::new(setup)),
+    },
+    CullerKind {
+        name: "full-seldom",
+        summary: "the same with longer postponement: fewer questions, more drawn",
+        asks: true,
+        make: |setup| Box::new(Full::new(setup, FullKnobs::seldom())),
+    },
+    CullerKind {
+        name: "full-trusting",
+        summary: "the same, and all of a group is drawn where one of it shows: the fewest questions",
+        asks: true,
+        make: |setup| Box::new(Full::new(setup, FullKnobs::trusting())),
     },
     CullerKind {
         name: "full-waits",

@@ -10,8 +10,10 @@ pub enum Postponement {
     /// numbers; this one doubles and then grows by steps of two, up to eight frames.
     #[default]
     Figure3,
-    /// Steeper, up to sixteen frames: fewer questions, more drawn in vain.
-    Steep,
+    /// Long from the first answer on, for devices on which a question is dear: fewer questions, more
+    /// drawn in vain. From the plant and the bunnies at full size: shorter waits do not reach the
+    /// paper's thrift in the bunnies, longer ones draw more than the paper's culler does.
+    Seldom,
 }
 
 impl Postponement {
@@ -22,7 +24,7 @@ impl Postponement {
         let curve: &[u32] = match self {
             Self::Never => &[0],
             Self::Figure3 => &[0, 1, 2, 4, 6, 8],
-            Self::Steep => &[1, 2, 4, 8, 12, 16],
+            Self::Seldom => &[24, 48],
         };
         curve[usize::from(streak).min(curve.len() - 1)]
     }
@@ -40,7 +42,7 @@ mod tests {
 
     #[test]
     fn longer_streaks_wait_no_less() {
-        for policy in [Postponement::Never, Postponement::Figure3, Postponement::Steep] {
+        for policy in [Postponement::Never, Postponement::Figure3, Postponement::Seldom] {
             let waits: Vec<u32> = (0..=u8::MAX).map(|streak| policy.wait(streak)).collect();
             assert!(waits.is_sorted(), "{policy:?}");
         }

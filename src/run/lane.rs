@@ -44,6 +44,35 @@ pub struct Lane<'a> {
     pub oracle: Box<dyn Oracle + 'a>,
     /// Who watches.
     pub observer: &'a mut dyn Observer,
+    /// Whether to measure as well how long the device takes for the truth's visible parts alone. Not
+    /// done where its memory is limited: it would change what is resident.
+    pub with_bound: bool,
+}
+
+/// What is run again, with new cullers: the traces must be equal, and wall times are the medians.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Repeat {
+    /// So many first frames.
+    pub frames: u32,
+    /// How often again.
+    pub rounds: u32,
+}
+
+impl Repeat {
+    /// Nothing.
+    pub const NONE: Self = Self { frames: 0, rounds: 0 };
+
+    /// The first frames, once.
+    #[must_use]
+    pub const fn first(frames: u32) -> Self {
+        Self { frames, rounds: 1 }
+    }
+
+    /// Frames run again of `frames`, over all rounds.
+    #[must_use]
+    pub fn total(self, frames: u32) -> u64 {
+        u64::from(self.frames.min(frames)) * u64::from(self.rounds)
+    }
 }
 
 /// Why a run ended early.
@@ -65,8 +94,8 @@ struct Shot {
     own: Option<ReadBack>,
 }
 
-/// Runs every lane over frames `0..frames`, then the first `repeat` frames a second time with new
-/// cullers. `tick` is called after each lane's frame and stops the run by returning false.
+/// Runs every lane over frames `0..frames`, the lanes in turn within each frame, then what `repeat`
+/// says, again in turn. `tick` is called after each lane's frame and stops the run by returning false.
 ///
 /// # Errors
 /// [`RunError::Oracle`] where an oracle gives up, [`RunError::Interrupted`] where `tick` says so.
@@ -76,7 +105,7 @@ struct Shot {
 pub fn run(
     world: &World,
     frames: u32,
-    repeat: u32,
+    repeat: Repeat,
     lanes: &mut [Lane<'_>],
     tick: &mut dyn FnMut() -> bool,
 ) -> Result<Vec<Trace>, RunError> {
@@ -90,14 +119,46 @@ pub fn run(
         for ((lane, culler), trace) in lanes.iter_mut().zip(&mut cullers).zip(&mut traces) {
             let shot = shoot(world, &state, truth_facts(&truth), lane, culler.as_mut())?;
             observe(world, &state, &truth, lane, &shot, &mut everything)?;
-            trace.frames.push(shot.trace);
+            let visible_wall_ns = match lane.info.device {
+                Some(_) if lane.with_bound && world.memory.is_none() => {
+                    Some(draw_visible(world, &state, &truth, lane.oracle.as_mut())?)
+                }
+                _ => None,
+            };
+            trace.frames.push(FrameTrace { visible_wall_ns, ..shot.trace });
             if !tick() {
                 return Err(RunError::Interrupted);
             }
         }
     }
-    repeat_first(world, repeat.min(frames), lanes, &traces)?;
+    run_again(world, repeat, lanes, &mut traces, tick)?;
     Ok(traces)
+}
+
+/// Draws the visible parts and nothing else, the nearest objects first, and returns the wall time in
+/// nanoseconds: what no culler can beat that draws by parts.
+fn draw_visible(
+    world: &World,
+    state: &FrameState,
+    truth: &Truth,
+    oracle: &mut dyn Oracle,
+) -> Result<u64, OracleError> {
+    let parts = (0..world.partition.part_count()).map(PartId);
+    let mut visible: Vec<(f64, PartId)> = parts
+        .filter(|part| truth.visible_pixels[part.0 as usize] > 0)
+        .map(|part| {
+            let (object, _) = world.partition.locate(part);
+            let center = state.objects[object.0 as usize].bounds.center();
+            (center.distance_squared(state.camera.eye), part)
+        })
+        .collect();
+    visible.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let start = Instant::now();
+    oracle.begin_frame(&FrameView { frame: state.frame, clip_from_object: &state.matrices })?;
+    let mut pen = Pen::new(oracle, &world.partition);
+    visible.into_iter().for_each(|(_, part)| pen.draw(part));
+    pen.finish()?;
+    Ok(start.elapsed().as_nanos() as u64)
 }
 
 /// What a trace keeps of the truth: visible parts, their triangles, the image's hash.
@@ -143,6 +204,7 @@ fn shoot(
         truth_hash,
         image_hash,
         wall_ns,
+        visible_wall_ns: None,
     };
     Ok(Shot { trace, drawn, own })
 }
@@ -173,20 +235,37 @@ fn observe(
     Ok(())
 }
 
-fn repeat_first(
+fn run_again(
     world: &World,
-    frames: u32,
+    repeat: Repeat,
     lanes: &mut [Lane<'_>],
-    traces: &[Trace],
-) -> Result<(), OracleError> {
-    let mut cullers: Vec<_> = lanes.iter().map(|lane| (lane.culler)()).collect();
-    for t in 0..frames {
-        let state = FrameState::at(world, t);
-        for ((lane, culler), trace) in lanes.iter_mut().zip(&mut cullers).zip(traces) {
-            let first = &trace.frames[t as usize];
-            let facts = (first.visible_parts, first.visible_triangles, first.truth_hash);
-            let again = shoot(world, &state, facts, lane, culler.as_mut())?;
-            lane.observer.repeated(first, &again.trace);
+    traces: &mut [Trace],
+    tick: &mut dyn FnMut() -> bool,
+) -> Result<(), RunError> {
+    let frames = traces.iter().map(|trace| trace.frames.len() as u32).max().unwrap_or(0);
+    let frames = repeat.frames.min(frames);
+    let walls_of = |trace: &Trace| trace.frames.iter().map(|frame| vec![frame.wall_ns]).collect();
+    let mut walls: Vec<Vec<Vec<u64>>> = traces.iter().map(walls_of).collect();
+    for _ in 0..repeat.rounds {
+        let mut cullers: Vec<_> = lanes.iter().map(|lane| (lane.culler)()).collect();
+        for t in 0..frames {
+            let state = FrameState::at(world, t);
+            for (place, (lane, culler)) in lanes.iter_mut().zip(&mut cullers).enumerate() {
+                let first = &traces[place].frames[t as usize];
+                let facts = (first.visible_parts, first.visible_triangles, first.truth_hash);
+                let again = shoot(world, &state, facts, lane, culler.as_mut())?;
+                walls[place][t as usize].push(again.trace.wall_ns);
+                lane.observer.repeated(first, &again.trace);
+                if !tick() {
+                    return Err(RunError::Interrupted);
+                }
+            }
+        }
+    }
+    for (trace, walls) in traces.iter_mut().zip(walls) {
+        for (frame, mut walls) in trace.frames.iter_mut().zip(walls) {
+            walls.sort_unstable();
+            frame.wall_ns = walls[(walls.len() - 1) / 2];
         }
     }
     Ok(())

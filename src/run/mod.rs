@@ -10,7 +10,7 @@ mod truth;
 
 pub use calibrate::{Bench, CalibrationKnobs, Workload, frames_to_measure, measure, workloads};
 pub use frame::{FrameState, World};
-pub use lane::{Lane, LaneInfo, Observer, RunError, run};
+pub use lane::{Lane, LaneInfo, Observer, Repeat, RunError, run};
 pub use trace::{DeviceImages, FrameRecord, FrameTrace, Trace};
 pub use truth::{Truth, depth_complexity, partition_difference, render};
 

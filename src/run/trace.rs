@@ -54,8 +54,11 @@ pub struct FrameTrace {
     pub truth_hash: u64,
     /// Hash of the depth that the culler's own draws left; 0 where no image is kept.
     pub image_hash: u64,
-    /// Wall time of the culler's frame, device included, in nanoseconds. Never compared.
+    /// Wall time of the culler's frame, device included, in nanoseconds; the lower median where the
+    /// frame was run several times. Never compared.
     pub wall_ns: u64,
+    /// Wall time for the visible parts alone, in nanoseconds, where it was asked for. Never compared.
+    pub visible_wall_ns: Option<u64>,
 }
 
 /// The record of one lane.

@@ -289,10 +289,16 @@ fn compare_sets_the_paper_beside_its_own_and_draws_the_figures() {
         assert!(png.width() >= 600);
     }
     let series = std::fs::read_to_string(out.join("series.csv")).unwrap();
-    assert_eq!(series.lines().count(), 1 + 3 * 3, "a head, three cullers, three frames");
+    assert_eq!(series.lines().count(), 1 + 6 * 3, "a head, six cullers, three frames");
+    let (code, again, talk) = call(args("sim", &["--rounds", "3", "--culler", "vfc", "--json"]));
+    assert_eq!(code, 0, "{talk}");
+    let (code, _, talk) = call(args("sim", &["--rounds", "0"]));
+    assert!(code == 2 && talk.contains("--rounds"), "{talk}");
     let (code, said, _) = call(args("sim", &["--json", "--culler", "vfc"]));
     let row: serde_json::Value = serde_json::from_str(said.trim()).unwrap();
     assert_eq!((code, &row["paper_parts"]), (0, &22344.0.into()), "{row}");
+    let again: serde_json::Value = serde_json::from_str(again.trim()).unwrap();
+    assert_eq!(row["trace_hash"], again["trace_hash"], "rounds repeat what one round does");
     let (code, _, talk) = call(args("sim", &["--cost", "nowhere.toml"]));
     assert!(code == 2 && talk.contains("nowhere.toml"), "{talk}");
     let (code, _, talk) = call(args("sim", &["--full-size"]));

@@ -8,7 +8,7 @@ use plainsight::index::IndexKind;
 use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware};
 use plainsight::oracle::{Always, CostModel, Oracle, Questions, Sim};
 use plainsight::part::PartitionKnobs;
-use plainsight::run::{Lane, LaneInfo, Trace, World, run};
+use plainsight::run::{Lane, LaneInfo, Repeat, Trace, World, run};
 use plainsight::scene::Viewport;
 use plainsight::scene::generate::{Knobs, build};
 
@@ -81,7 +81,9 @@ pub(crate) fn gate(
         replay: format!("scene {} seed {}", world.scene.name, world.scene.seed),
     };
     let mut gate = Gate::default();
-    let lane = Lane { info, culler: Box::new(make), oracle, observer: &mut gate };
-    let mut traces = run(world, world.scene.frames, 1, &mut [lane], &mut || true).unwrap();
+    let (culler, observer) = (Box::new(make), &mut gate);
+    let lane = Lane { info, culler, oracle, observer, with_bound: false };
+    let mut traces =
+        run(world, world.scene.frames, Repeat::first(1), &mut [lane], &mut || true).unwrap();
     (traces.pop().unwrap(), gate)
 }

@@ -2,6 +2,8 @@
 
 use plainsight::cull::{CULLERS, ProxyKind};
 use plainsight::index::{INDEXES, IndexKind};
+use plainsight::oracle::CostModel;
+use plainsight::run::FrameTrace;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
@@ -79,4 +81,24 @@ fn random_soups_hold() {
             Ok(())
         })
         .unwrap();
+}
+
+/// The promise of `full-adaptive`: by the model that it weighs by, no frame costs more than frustum
+/// culling and a twentieth, in any scene.
+#[test]
+fn the_adaptive_culler_never_costs_much_more_than_frustum_culling() {
+    const MOST: f64 = 1.05;
+    let model = CostModel::lavapipe();
+    for scene in SCENES {
+        let world = world(scene, 1, 0.1, 12);
+        let costs = |name: &str| {
+            let culler = *CULLERS.iter().find(|c| c.name == name).unwrap();
+            let (trace, _) = gate(&world, culler, INDEXES[0], "sim", ProxyKind::Rectangle);
+            let cost = |frame: &FrameTrace| model.frame_total_ns(frame.amounts()) as f64;
+            trace.frames.iter().map(cost).collect::<Vec<f64>>()
+        };
+        for (frame, (ours, vfc)) in costs("full-adaptive").iter().zip(costs("vfc")).enumerate() {
+            assert!(ours / vfc <= MOST, "{scene} frame {frame}: {ours} ns against {vfc} ns");
+        }
+    }
 }
