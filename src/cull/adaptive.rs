@@ -6,7 +6,8 @@
 //! 1. Walk both levels front to back (their Algorithms 2 to 4). Inner nodes that were visible last
 //!    time are opened; parts that were visible last time *show*; the rest is unknown.
 //! 2. Of what shows the nearest are drawn unasked, [`UNASKED`] of the work: they hide most. Where
-//!    nothing shows (a first frame, a turn) the nearest parts are searched for and drawn.
+//!    nothing shows (a first frame, a turn) the nearest part is searched for and drawn, and what nothing
+//!    is known of is asked about in layers.
 //! 3. The rest of what shows is asked about before it is drawn, then the unknown, one batch each; with
 //!    the unknown those drawn parts whose answer may spare work in the next frames. A question costs
 //!    what the model says; what it may save is the work behind it times the odds of "hidden", learned
@@ -279,16 +280,21 @@ impl Adaptive {
         }
     }
 
-    /// Opens all that is pending, and all below it, without a question.
-    fn give_up(&mut self, view: &View<'_>, pen: &mut Pen<'_>) {
-        while let Some(pending) = self.pending.pop() {
+    /// Opens these, and all below them, without a question, the nearest first: what is drawn later than
+    /// what it is hidden by costs less. What was pending stays so.
+    fn open_all(&mut self, view: &View<'_>, pen: &mut Pen<'_>, mut these: Vec<Pending>) {
+        let others = std::mem::take(&mut self.pending);
+        these.sort_by(|a, b| b.depth.total_cmp(&a.depth));
+        while let Some(pending) = these.pop() {
             if self.scenery.is_part(pending.item) {
                 self.draw(view, pen, pending);
             } else {
                 self.open(view, pen, pending.item, pending.parent);
                 self.walk(view, pen);
+                these.extend(self.pending.drain(..).rev());
             }
         }
+        self.pending = others;
     }
 
     /// Puts what to ask about a node into the pool. As many boxes as cost no more than
@@ -441,7 +447,7 @@ impl Adaptive {
                 match self.pick(view, showing, false) {
                     Some(mut batch) => {
                         let left = std::mem::take(&mut batch.left);
-                        left.into_iter().for_each(|part| self.draw(view, pen, part));
+                        self.open_all(view, pen, left);
                         self.settle(view, pen, &batch)?;
                         self.pending.append(&mut batch.later);
                     }
@@ -454,7 +460,8 @@ impl Adaptive {
             let new_depth = |p: &Pending| (p.kind == Kind::New).then_some(p.depth);
             let (layer, mut farther) = next_layer(unknown, self.drawn_parts, new_depth);
             let Some(mut batch) = self.pick(view, layer, true) else {
-                self.give_up(view, pen);
+                let these = std::mem::take(&mut self.pending);
+                self.open_all(view, pen, these);
                 self.pending.append(&mut farther);
                 if self.pending.is_empty() {
                     break;
@@ -467,14 +474,7 @@ impl Adaptive {
             self.draw_nearest(view, pen, asked);
             self.pending.append(&mut batch.later);
             // What is not worth a question is opened behind what is known.
-            for pending in batch.left {
-                if self.scenery.is_part(pending.item) {
-                    self.draw(view, pen, pending);
-                } else {
-                    self.open(view, pen, pending.item, pending.parent);
-                    self.walk(view, pen);
-                }
-            }
+            self.open_all(view, pen, batch.left);
         }
         Ok(())
     }

@@ -17,8 +17,8 @@
 //! 6. Tightened boxes (section 3.4) where contents stand still; lazy reconstruction is the index's.
 //!    Parts are asked about by some boxes each, which together are tighter than one.
 //!
-//! `full-seldom` is the same with longer waits, and `full-trusting` moreover believes a group that shows
-//! of all its members: where questions are dear, as on the paper's device, they trade parts for them.
+//! `full-trusting` is the same with longer waits, and believes a group that shows of all its members:
+//! where questions are dear, as on the paper's device, it trades parts for them.
 //!
 //! Departures: the paper's rule that questions with overlapping rectangles wait for one another is not
 //! kept: what was visible last time is drawn before anything is asked, so the buffer is nearly whole,
@@ -77,18 +77,15 @@ impl Default for FullKnobs {
 }
 
 impl FullKnobs {
-    /// Of `full-seldom`.
-    #[must_use]
-    pub fn seldom() -> Self {
-        let postponement = Postponement::Seldom;
-        Self { name: "full-seldom", postponement, ..Self::default() }
-    }
-
     /// Of `full-trusting`.
     #[must_use]
     pub fn trusting() -> Self {
-        let after_group = AfterGroup::Trust;
-        Self { name: "full-trusting", after_group, ..Self::seldom() }
+        Self {
+            name: "full-trusting",
+            postponement: Postponement::Seldom,
+            after_group: AfterGroup::Trust,
+            ..Self::default()
+        }
     }
 }
 

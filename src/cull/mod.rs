@@ -120,14 +120,8 @@ pub const CULLERS: &[CullerKind] = &[
         make: |setup| Box::new(Adaptive::new(setup)),
     },
     CullerKind {
-        name: "full-seldom",
-        summary: "the same with longer postponement: fewer questions, more drawn",
-        asks: true,
-        make: |setup| Box::new(Full::new(setup, FullKnobs::seldom())),
-    },
-    CullerKind {
         name: "full-trusting",
-        summary: "the same, and all of a group is drawn where one of it shows: the fewest questions",
+        summary: "full with long postponement, drawing all of a group that shows: the fewest questions",
         asks: true,
         make: |setup| Box::new(Full::new(setup, FullKnobs::trusting())),
     },

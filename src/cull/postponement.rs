@@ -7,7 +7,7 @@ pub enum Postponement {
     /// In every frame.
     Never,
     /// The more "visible" answers in a row, the more frames to wait. The paper draws the curve without
-    /// numbers; this one doubles and then grows by steps of two, up to eight frames.
+    /// numbers; this one doubles, up to sixteen frames.
     #[default]
     Figure3,
     /// Long from the first answer on, for devices on which a question is dear: fewer questions, more
@@ -23,7 +23,7 @@ impl Postponement {
     pub fn wait(self, streak: u8) -> u32 {
         let curve: &[u32] = match self {
             Self::Never => &[0],
-            Self::Figure3 => &[0, 1, 2, 4, 6, 8],
+            Self::Figure3 => &[0, 1, 2, 4, 8, 16],
             Self::Seldom => &[24, 48],
         };
         curve[usize::from(streak).min(curve.len() - 1)]
@@ -47,6 +47,6 @@ mod tests {
             assert!(waits.is_sorted(), "{policy:?}");
         }
         assert_eq!(Postponement::Never.wait(200), 0);
-        assert_eq!((Postponement::Figure3.wait(0), Postponement::Figure3.wait(99)), (0, 8));
+        assert_eq!((Postponement::Figure3.wait(0), Postponement::Figure3.wait(99)), (0, 16));
     }
 }

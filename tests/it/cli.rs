@@ -2,9 +2,14 @@
 
 use assert_cmd::Command;
 
-/// Exit code, standard output and standard error of the program.
+/// Exit code, standard output and standard error of the program. Without `XDG_RUNTIME_DIR`, as in most
+/// CI, the driver's Wayland library puts a line of its own on standard error.
 pub(crate) fn plainsight(args: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("plainsight").unwrap().args(args).output().unwrap();
+    let mut program = Command::cargo_bin("plainsight").unwrap();
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        program.env("XDG_RUNTIME_DIR", std::env::temp_dir());
+    }
+    let output = program.args(args).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
@@ -289,7 +294,7 @@ fn compare_sets_the_paper_beside_its_own_and_draws_the_figures() {
         assert!(png.width() >= 600);
     }
     let series = std::fs::read_to_string(out.join("series.csv")).unwrap();
-    assert_eq!(series.lines().count(), 1 + 6 * 3, "a head, six cullers, three frames");
+    assert_eq!(series.lines().count(), 1 + 5 * 3, "a head, five cullers, three frames");
     let (code, again, talk) = call(args("sim", &["--rounds", "3", "--culler", "vfc", "--json"]));
     assert_eq!(code, 0, "{talk}");
     let (code, _, talk) = call(args("sim", &["--rounds", "0"]));

@@ -6,6 +6,8 @@ use std::sync::Arc;
 use super::images::Images;
 use super::pyramid::{Ask, Pyramid};
 use super::read_back::{DepthReader, MOST_COPIES};
+use super::redraw::encode_redraw;
+use super::slot::{Need, QUERIES_PER_PASS, RESULT_BYTES, Slot};
 use super::stage::{DrawnObject, GpuParts, GpuStage};
 use crate::oracle::{
     Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, Questions, ReadBack, Residency,
@@ -13,12 +15,6 @@ use crate::oracle::{
 };
 use crate::part::{ObjectId, PartId};
 use crate::scene::Viewport;
-
-/// Queries in one pass; a batch with more has several passes. Mesa 22.3.6's lavapipe returned wrong
-/// counts for some empty queries in passes of 768 and more; 640 were right.
-pub const QUERIES_PER_PASS: usize = 128;
-/// Bytes of one result.
-const RESULT_BYTES: u64 = 8;
 
 /// One thing to do, in the order it was said.
 #[derive(Clone, Copy)]
@@ -34,41 +30,6 @@ enum Event {
         first: u32,
         end: u32,
     },
-}
-
-/// What a batch needs on the device, kept for the next one.
-struct Slot {
-    queries: Vec<wgpu::QuerySet>,
-    resolved: wgpu::Buffer,
-    staging: wgpu::Buffer,
-    proxies: wgpu::Buffer,
-}
-
-impl Slot {
-    /// Room for `bytes` of results and for proxies of `vertices` bytes.
-    fn new(device: &wgpu::Device, bytes: u64, vertices: u64) -> Self {
-        let buffer = |size: u64, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: None,
-                size: size.next_power_of_two(),
-                usage,
-                mapped_at_creation: false,
-            })
-        };
-        let written = wgpu::BufferUsages::QUERY_RESOLVE
-            | wgpu::BufferUsages::STORAGE
-            | wgpu::BufferUsages::COPY_DST
-            | wgpu::BufferUsages::COPY_SRC;
-        let read = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        let proxies =
-            wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-        Self {
-            queries: Vec::new(),
-            resolved: buffer(bytes, written),
-            staging: buffer(bytes, read),
-            proxies: buffer(vertices, proxies),
-        }
-    }
 }
 
 /// A batch on its way.
@@ -446,28 +407,11 @@ impl Hardware {
 
     /// A slot with room for this batch, made or reused.
     fn slot(&mut self) -> Slot {
-        let device = &self.stage.gpu.device;
-        let sets = self.open.len().div_ceil(QUERIES_PER_PASS);
-        let bytes = (sets * QUERIES_PER_PASS) as u64 * RESULT_BYTES;
         let vertices = size_of_val(self.proxy_vertices.as_slice()) as u64;
-        let vertices = vertices.max(size_of_val(self.asks.as_slice()) as u64);
-        let mut slot = self.free.pop().unwrap_or_else(|| Slot::new(device, bytes, vertices));
-        if slot.resolved.size() < bytes || slot.proxies.size() < vertices {
-            let (bytes, vertices) =
-                (bytes.max(slot.resolved.size()), vertices.max(slot.proxies.size()));
-            slot = Slot { queries: slot.queries, ..Slot::new(device, bytes, vertices) };
-        }
-        if self.pyramid.is_some() {
-            return slot;
-        }
-        while slot.queries.len() < sets {
-            slot.queries.push(device.create_query_set(&wgpu::QuerySetDescriptor {
-                label: None,
-                ty: wgpu::QueryType::Occlusion,
-                count: QUERIES_PER_PASS as u32,
-            }));
-        }
-        slot
+        let proxies = vertices.max(size_of_val(self.asks.as_slice()) as u64);
+        let with_objects = self.questions == Questions::Queries;
+        let need = Need { questions: self.open.len(), proxies, with_objects };
+        Slot::with_room(&self.stage.gpu.device, self.free.pop(), need)
     }
 
     /// Encodes the batch's events from `from` on as one pass of at most [`QUERIES_PER_PASS`]
@@ -481,7 +425,7 @@ impl Hardware {
     ) -> usize {
         let load = if clear { wgpu::LoadOp::Clear(1.0) } else { wgpu::LoadOp::Load };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            depth_stencil_attachment: Some(depth_attachment(&self.images, load)),
+            depth_stencil_attachment: Some(self.images.depth_attachment(load)),
             occlusion_query_set: slot.map(|(slot, set)| &slot.queries[set]),
             ..Default::default()
         });
@@ -522,77 +466,6 @@ impl Hardware {
             }
         }
         self.events.len()
-    }
-
-    /// Draws `parts` in draw-index order into `encoder`.
-    fn encode_redraw(&self, encoder: &mut wgpu::CommandEncoder, images: &Images, parts: &[PartId]) {
-        let partition = &self.stage.stage.partition;
-        let mut runs: Vec<(ObjectId, std::ops::Range<u32>, bool)> = Vec::new();
-        let mut picked: Vec<[u32; 3]> = Vec::new();
-        let mut rest = parts;
-        while let Some(&part) = rest.first() {
-            let (object, _) = partition.locate(part);
-            let first = partition.first_part(object).0;
-            let mesh = partition.mesh(object);
-            let end = first + mesh.parts.len() as u32;
-            let (these, later) = rest.split_at(rest.partition_point(|p| p.0 < end));
-            rest = later;
-            if these.len() == mesh.parts.len() {
-                runs.push((object, 0..mesh.triangles.len() as u32 * 3, true));
-                continue;
-            }
-            let mut wanted = vec![false; mesh.parts.len()];
-            these.iter().for_each(|p| wanted[(p.0 - first) as usize] = true);
-            let ranked = &self.stage.meshes[partition.mesh_index(object) as usize].ranked;
-            let from = picked.len() as u32 * 3;
-            let of = ranked.iter().zip(&mesh.part_of_rank);
-            picked.extend(of.filter(|(_, part)| wanted[**part as usize]).map(|(t, _)| *t));
-            runs.push((object, from..picked.len() as u32 * 3, false));
-        }
-        let device = &self.stage.gpu.device;
-        let size = (size_of_val(picked.as_slice()) as u64).max(16);
-        let usage = wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST;
-        let indices = device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size,
-            usage,
-            mapped_at_creation: false,
-        });
-        self.stage.gpu.queue.write_buffer(&indices, 0, bytemuck::cast_slice(&picked));
-        let ids = images.ids_view().map(|view| wgpu::RenderPassColorAttachment {
-            view,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations {
-                load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                store: wgpu::StoreOp::Store,
-            },
-        });
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            color_attachments: &[ids],
-            depth_stencil_attachment: Some(depth_attachment(images, wgpu::LoadOp::Clear(1.0))),
-            ..Default::default()
-        });
-        pass.set_pipeline(&self.stage.draw_ids);
-        for (object, run, whole) in runs {
-            let mesh = &self.stage.meshes[partition.mesh_index(object) as usize];
-            pass.set_vertex_buffer(0, mesh.parts.vertices.slice(..));
-            let from = if whole { &mesh.by_rank } else { &indices };
-            pass.set_index_buffer(from.slice(..), wgpu::IndexFormat::Uint32);
-            pass.set_immediates(0, bytemuck::bytes_of(&self.drawn_object(object)));
-            pass.draw_indexed(run, 0, 0..1);
-        }
-    }
-}
-
-fn depth_attachment(
-    images: &Images,
-    load: wgpu::LoadOp<f32>,
-) -> wgpu::RenderPassDepthStencilAttachment<'_> {
-    wgpu::RenderPassDepthStencilAttachment {
-        view: &images.depth_view,
-        depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
-        stencil_ops: None,
     }
 }
 
@@ -716,7 +589,8 @@ impl Oracle for Hardware {
             .take()
             .unwrap_or_else(|| Images::new(&self.stage.gpu, self.stage.stage.viewport, true));
         let mut encoder = self.encoder();
-        self.encode_redraw(&mut encoder, &images, parts);
+        let drawn_object = |object| self.drawn_object(object);
+        encode_redraw(&self.stage, &drawn_object, &mut encoder, &images, parts);
         let read_back = images.read_back(&self.stage.gpu, encoder);
         self.redraw_images = Some(images);
         read_back.map(Some)

@@ -15,6 +15,18 @@ pub(super) struct Images {
 }
 
 impl Images {
+    /// The depth image as a pass draws into it.
+    pub(super) fn depth_attachment(
+        &self,
+        load: wgpu::LoadOp<f32>,
+    ) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+        wgpu::RenderPassDepthStencilAttachment {
+            view: &self.depth_view,
+            depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
+            stencil_ops: None,
+        }
+    }
+
     pub(super) fn new(gpu: &Gpu, viewport: Viewport, with_ids: bool) -> Self {
         let texture = |format| {
             gpu.device.create_texture(&wgpu::TextureDescriptor {

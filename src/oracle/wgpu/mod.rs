@@ -10,8 +10,11 @@ mod hardware;
 mod images;
 mod pyramid;
 mod read_back;
+mod redraw;
+mod slot;
 mod stage;
 
 pub use gpu::{Gpu, NO_DEVICE};
-pub use hardware::{Hardware, QUERIES_PER_PASS};
+pub use hardware::Hardware;
+pub use slot::QUERIES_PER_PASS;
 pub use stage::GpuStage;
