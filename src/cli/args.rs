@@ -125,7 +125,7 @@ pub(super) struct RunArgs {
     /// Scenes by name, or scene files (default: bunnies city rooms soup).
     #[arg(long, value_name = "NAME|FILE.toml", num_args = 1.., value_delimiter = ',')]
     pub(super) scene: Vec<String>,
-    /// Cullers (default: full full-adaptive full-trusting simple vfc).
+    /// Cullers (default: full simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
     /// Oracles: sim, hardware, pyramid, read-back, always (default: sim, and hardware where a Vulkan device is found).

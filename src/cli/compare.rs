@@ -20,7 +20,7 @@ const SCENES: [&str; 2] = ["powerplant", "bunnies"];
 /// Leaf sizes at full size. The paper's text has 23 parts a bunny, its table about 75; its plant is cut
 /// so that frustum culling draws 1,678 parts a frame, which comes nearest with 6144.
 const FULL_LEAVES: [(&str, &[u32]); 2] = [("powerplant", &[6144]), ("bunnies", &[3072, 1600])];
-/// The cullers of the paper's table, and the variants of its own that reach its claims here.
+/// The cullers of the paper's table, the one that weighs its questions and the one that asks least.
 const CULLERS: [&str; 5] = ["full", "full-adaptive", "full-trusting", "simple", "vfc"];
 
 /// One scene with one leaf size.

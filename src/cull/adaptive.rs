@@ -31,8 +31,8 @@ use crate::oracle::{CostModel, OracleError, Proxy};
 /// Share of the cost of frustum culling that questions may waste in a frame.
 const ALLOWANCE: f64 = 0.05;
 /// Share of the work of what was visible last time that is drawn unasked. In the plant and the bunnies
-/// 0.3 to 0.7 draw within 3 % of the same and 0.8 hardly more, but in a batch less: lavapipe works on
-/// its threads together only within one.
+/// 0.3 to 0.7 draw within 3 % of the same and 0.8 up to 8 % more, in one batch less: lavapipe's threads
+/// work together only within one, and it takes no longer.
 const UNASKED: f64 = 0.8;
 /// Levels of unknown nodes that are gone down between two batches where a node in view was opened: a
 /// batch costs as much as many questions.

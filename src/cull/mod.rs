@@ -115,7 +115,7 @@ pub const CULLERS: &[CullerKind] = &[
     },
     CullerKind {
         name: "full-adaptive",
-        summary: "the same, weighing every question by a cost model (--cost): never far over vfc",
+        summary: "full, weighing every question by a cost model (--cost): never far over vfc",
         asks: true,
         make: |setup| Box::new(Adaptive::new(setup)),
     },
@@ -127,7 +127,7 @@ pub const CULLERS: &[CullerKind] = &[
     },
     CullerKind {
         name: "full-waits",
-        summary: "the same to the letter: questions with overlapping rectangles wait for one another",
+        summary: "the paper to the letter: questions with overlapping rectangles wait for one another",
         asks: true,
         make: |setup| Box::new(FullWaits::new(setup, FullWaitsKnobs::default())),
     },

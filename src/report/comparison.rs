@@ -210,7 +210,7 @@ impl Comparison<'_> {
         if let Some(ms) = self.visible_ms() {
             let ratio = mean(vfc, wall_ms) / ms;
             text += &format!(
-                "the visible parts drawn alone: {ms:.1} ms; vfc ÷ that: {ratio:.2}, fraction {:.2} of the ceiling {ceiling:.2}, which no culler can pass\n",
+                "the visible parts drawn alone: {ms:.1} ms; vfc ÷ that: {ratio:.2}, fraction {:.2} of the ceiling {ceiling:.2}; no culler can draw less\n",
                 ratio / ceiling
             );
         }
