@@ -13,8 +13,9 @@
 //!    what the model says; what it may save is the work behind it times the odds of "hidden", learned
 //!    as answers come. Questions that do not pay are not asked, nor is a batch that does not pay for its
 //!    round trip; what they were about is drawn.
-//! 4. What a batch finds visible is drawn, the nearest first, at most as much as was drawn before it:
-//!    the rest may be hidden by it and is asked about once more.
+//! 4. What a batch finds visible is drawn, at most as much as was drawn before it and the nearest of it:
+//!    the rest may be hidden by it and is asked about once more. What is drawn together is drawn in the
+//!    order of the walk: by their nearest corners, large parts would come before what hides them.
 //! 5. Questions in a frame may cost no more than they are known to have saved in it, and the allowance
 //!    of what frustum culling would cost (step 4 of the walk adds that up). So the bound holds for
 //!    virtual time by construction, and for wall time as far as the model is true.
@@ -23,17 +24,26 @@
 
 use super::layers::next_layer;
 use super::opened::{NO_PARENT, OpenedNodes};
-use super::scenery::Appearance;
+use super::scenery::{Appearance, NodeHistory};
 use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View};
 use crate::index::NodeId;
 use crate::oracle::{CostModel, OracleError, Proxy};
 
-/// Share of the cost of frustum culling that questions may waste in a frame.
-const ALLOWANCE: f64 = 0.05;
+/// Share of the cost of frustum culling that questions may waste in a frame. On lavapipe they waste two
+/// to three times what the model says: see [`DRAIN`].
+const ALLOWANCE: f64 = 0.03;
 /// Share of the work of what was visible last time that is drawn unasked. In the plant and the bunnies
 /// 0.3 to 0.7 draw within 3 % of the same and 0.8 up to 8 % more, in one batch less: lavapipe's threads
 /// work together only within one, and it takes no longer.
 const UNASKED: f64 = 0.8;
+/// Share of the work drawn since the last round trip that waiting for one costs beyond the model's
+/// price: the device must finish it first, and has nothing else to do meanwhile. Seen on lavapipe: a
+/// frame of 110 ms takes 6 to 13 ms longer for a single round trip with 50 questions.
+const DRAIN: f64 = 0.1;
+/// Share of what was found hidden that counts as saved when further questions are paid from it. The
+/// model knows a mean price; in a near view of the plant leaving out a third of the triangles, all
+/// hidden, saved a tenth of the time.
+const SURELY_SAVED: f64 = 0.6;
 /// Levels of unknown nodes that are gone down between two batches where a node in view was opened: a
 /// batch costs as much as many questions.
 const LEVELS_A_BATCH: u32 = 2;
@@ -96,6 +106,12 @@ struct History {
     asked_after: u32,
 }
 
+impl NodeHistory for History {
+    fn inherit(&mut self, below: &Self) {
+        self.visible_after = self.visible_after.max(below.visible_after);
+    }
+}
+
 /// A node that was reached and not yet settled.
 #[derive(Clone, Copy, Debug)]
 struct Pending {
@@ -106,6 +122,8 @@ struct Pending {
     /// The place in `opened` of the node it was reached from.
     parent: usize,
     kind: Kind,
+    /// Its place in the order of the walk.
+    turn: u32,
     /// Nanoseconds that drawing what is in the frustum of it would take.
     work_ns: f64,
 }
@@ -138,12 +156,19 @@ struct Account {
     asked: f64,
     /// Found hidden.
     saved: f64,
+    /// Drawn before the last round trip.
+    drained: f64,
 }
 
 impl Account {
+    /// What it costs to wait for answers before more is drawn, beside the model's price.
+    fn drain(&self) -> f64 {
+        DRAIN * (self.drawn - self.drained)
+    }
+
     /// What the next batch may cost.
     fn purse(&self) -> f64 {
-        ALLOWANCE * self.everything + self.saved - self.asked
+        ALLOWANCE * self.everything + SURELY_SAVED * self.saved - self.asked
     }
 }
 
@@ -159,6 +184,7 @@ pub struct Adaptive {
     pending: Vec<Pending>,
     drawn: Vec<Drawn>,
     drawn_parts: usize,
+    turns: u32,
     stack: Vec<(Item, usize)>,
     account: Account,
     proxies: Vec<Proxy>,
@@ -182,6 +208,7 @@ impl Adaptive {
             pending: Vec::new(),
             drawn: Vec::new(),
             drawn_parts: 0,
+            turns: 0,
             stack: Vec::new(),
             account: Account::default(),
             proxies: Vec::new(),
@@ -222,7 +249,9 @@ impl Adaptive {
             } else {
                 let weight = self.scenery.weight_inside(view, item);
                 let work_ns = self.model.drawing_ns(weight.parts, weight.triangles);
-                self.pending.push(Pending { item, proxy, depth, parent, kind, work_ns });
+                let turn = self.turns;
+                self.turns += 1;
+                self.pending.push(Pending { item, proxy, depth, parent, kind, turn, work_ns });
             }
         }
     }
@@ -252,7 +281,7 @@ impl Adaptive {
         self.drawn.push(Drawn { item, proxy, place, work_ns });
     }
 
-    /// Draws the nearest of what shows, up to so much work.
+    /// Draws the nearest of what shows, up to so much work, in the order of the walk.
     fn draw_nearest(&mut self, view: &View<'_>, pen: &mut Pen<'_>, most_ns: f64) {
         let shows = |pending: &Pending| pending.kind == Kind::Shows;
         self.pending.sort_by(|a, b| shows(b).cmp(&shows(a)).then(a.depth.total_cmp(&b.depth)));
@@ -261,7 +290,8 @@ impl Adaptive {
             sum += self.pending[count].work_ns;
             count += 1;
         }
-        let parts: Vec<Pending> = self.pending.drain(..count).collect();
+        let mut parts: Vec<Pending> = self.pending.drain(..count).collect();
+        parts.sort_unstable_by_key(|part| part.turn);
         parts.into_iter().for_each(|part| self.draw(view, pen, part));
     }
 
@@ -326,8 +356,10 @@ impl Adaptive {
     /// stay pending.
     fn pick(&mut self, view: &View<'_>, pending: Vec<Pending>, due: bool) -> Option<Batch> {
         self.proxies.clear();
-        let mut purse = self.account.purse() - self.model.trip_ns;
-        let mut gain = -self.model.trip_ns;
+        let trip = self.model.trip_ns;
+        let mut purse = self.account.purse() - trip;
+        // Nothing is left to draw after a batch about what is drawn.
+        let mut gain = -trip - if pending.is_empty() { 0.0 } else { self.account.drain() };
         let mut valued: Vec<(f64, Question, Pending)> = Vec::with_capacity(pending.len());
         for p in pending {
             let question = self.question(view, p.item, p.proxy, p.work_ns);
@@ -381,6 +413,7 @@ impl Adaptive {
         let mut answers = Vec::new();
         pen.round_trip(&mut answers)?;
         self.account.asked += self.model.trip_ns;
+        self.account.drained = self.account.drawn;
         let (first, later) = answers.split_at(batch.asked.len());
         for ((_, drawn), answer) in batch.due.iter().zip(later) {
             self.note(view, drawn.item, Kind::Shows, answer.visible);
@@ -506,6 +539,7 @@ impl Culler for Adaptive {
         self.pending.clear();
         self.drawn.clear();
         self.drawn_parts = 0;
+        self.turns = 0;
         self.account = Account { everything: self.model.frame_ns, ..Account::default() };
         self.stack.push((Item::Scene(NodeId(0)), NO_PARENT));
         self.walk(view, pen);

@@ -12,7 +12,7 @@
 
 use super::opened::{NO_PARENT, OpenedNodes};
 use super::postponement::scatter;
-use super::scenery::Appearance;
+use super::scenery::{Appearance, NodeHistory};
 use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View, group};
 use crate::index::NodeId;
 use crate::oracle::{OracleError, Proxy};
@@ -32,6 +32,12 @@ struct History {
     hidden_after: u32,
     /// Frames in a row in which it was found hidden.
     hidden_frames: u32,
+}
+
+impl NodeHistory for History {
+    fn inherit(&mut self, below: &Self) {
+        self.visible_after = self.visible_after.max(below.visible_after);
+    }
 }
 
 /// A node to be asked about, or asked.

@@ -17,8 +17,9 @@
 //! 6. Tightened boxes (section 3.4) where contents stand still; lazy reconstruction is the index's.
 //!    Parts are asked about by some boxes each, which together are tighter than one.
 //!
-//! `full-trusting` is the same with longer waits, and believes a group that shows of all its members:
-//! where questions are dear, as on the paper's device, it trades parts for them.
+//! `full-trusting` is the same with longer waits, believes a group that shows of all its parts, and
+//! finds what shows among its nodes by halving: where questions are dear, as on the paper's device, it
+//! trades parts and round trips for them.
 //!
 //! Departures: the paper's rule that questions with overlapping rectangles wait for one another is not
 //! kept: what was visible last time is drawn before anything is asked, so the buffer is nearly whole,
@@ -28,7 +29,7 @@
 use super::layers::next_layer;
 use super::opened::{NO_PARENT, OpenedNodes};
 use super::postponement::scatter;
-use super::scenery::Appearance;
+use super::scenery::{Appearance, NodeHistory};
 use super::{Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, View, group};
 use crate::index::NodeId;
 use crate::oracle::{OracleError, Proxy};
@@ -58,7 +59,8 @@ pub enum AfterGroup {
     /// Each is asked about alone.
     #[default]
     AskAgain,
-    /// Parts are drawn; nodes are asked about alone. So failing costs little, and groups are made larger.
+    /// Parts are drawn; nodes are asked about by halves, the second only if the first does not explain
+    /// what shows. So failing costs few questions, if more round trips, and groups are made larger.
     Trust,
 }
 
@@ -92,10 +94,10 @@ impl FullKnobs {
 /// Boxes by which a part is asked about: in the bunnies four let pass an eighth fewer parts than one,
 /// and sixteen only a twentieth fewer again for three times the boxes.
 const MOST_BOXES: usize = 4;
-/// What trusting makes of the chance that a node comes into view, in making up groups: a failure costs a
-/// part that was not hidden for sure anyway. In the bunnies a tenth asks 10 % less than one and draws
-/// 8 % more.
-const TRUSTING_DOUBT: f64 = 0.1;
+/// What trusting makes of the chance that a node comes into view, in making up groups: a failure costs
+/// parts that were not hidden for sure anyway, and halving. In the bunnies this asks 4 % less than a
+/// tenth and draws 4 % more.
+const TRUSTING_DOUBT: f64 = 0.03;
 
 /// What is remembered of a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -112,6 +114,12 @@ struct History {
     ask_from: u32,
 }
 
+impl NodeHistory for History {
+    fn inherit(&mut self, below: &Self) {
+        self.visible_after = self.visible_after.max(below.visible_after);
+    }
+}
+
 /// A node that was invisible last time, to be asked about.
 struct Candidate {
     item: Item,
@@ -122,8 +130,14 @@ struct Candidate {
     parent: usize,
     /// The chance that it is hidden; `None` where nothing is known of it.
     chance: Option<f64>,
-    /// Whether it failed in a group and is to be asked about alone.
-    alone: bool,
+}
+
+/// Candidates in one question.
+#[derive(Default)]
+struct Group {
+    nodes: Vec<Candidate>,
+    /// Something shows in `nodes` or in these.
+    rest: Vec<Candidate>,
 }
 
 /// A drawn part whose next question is due.
@@ -139,10 +153,19 @@ struct Due {
 struct Frame {
     opened: OpenedNodes,
     candidates: Vec<Candidate>,
+    /// What is left of groups that show.
+    groups: Vec<Group>,
     due: Vec<Due>,
     stack: Vec<(Item, usize)>,
     drawn_parts: usize,
     proxies: Vec<Proxy>,
+}
+
+impl Frame {
+    /// Whether there is nothing left to ask about.
+    fn settled(&self) -> bool {
+        self.candidates.is_empty() && self.groups.is_empty() && self.due.is_empty()
+    }
 }
 
 /// The paper's culler.
@@ -183,7 +206,7 @@ impl Full {
             let visible_last_time = view.frame > 0 && history.visible_after == view.frame;
             if !visible_last_time {
                 let chance = self.chance_hidden(view, item);
-                let candidate = Candidate { item, proxy, depth, parent, chance, alone: false };
+                let candidate = Candidate { item, proxy, depth, parent, chance };
                 self.frame.candidates.push(candidate);
             } else if self.scenery.is_part(item) && view.frame >= history.ask_from {
                 let place = self.open(view, pen, item, parent, false);
@@ -260,27 +283,16 @@ impl Full {
 
     /// One batch of questions about candidates and due nodes; what shows is walked.
     fn batch(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
-        let candidates = std::mem::take(&mut self.frame.candidates);
-        let new_depth = |c: &Candidate| c.chance.is_none().then_some(c.depth);
-        let (candidates, later) = next_layer(candidates, self.frame.drawn_parts, new_depth);
-        self.frame.candidates = later;
-        let chance = |c: &Candidate| {
-            let unknown = group::chance_of_staying_hidden(0);
-            if c.alone { 0.0 } else { c.chance.unwrap_or(unknown) }
-        };
-        let chances: Vec<f64> = candidates.iter().map(chance).collect();
-        let mut ends = group::runs(&chances, self.knobs.most_together);
-        ends.truncate(self.knobs.most_in_flight);
-        let mut start = 0;
-        for &end in &ends {
+        let mut groups = self.next_groups();
+        self.frame.groups = groups.split_off(self.knobs.most_in_flight.min(groups.len()));
+        for group in &groups {
             self.frame.proxies.clear();
-            for candidate in &candidates[start..end] {
+            for candidate in &group.nodes {
                 self.push_proxies(view, candidate.item, candidate.proxy);
             }
             pen.ask_any(&self.frame.proxies);
-            start = end;
         }
-        let room = self.knobs.most_in_flight - ends.len();
+        let room = self.knobs.most_in_flight - groups.len();
         let later = self.frame.due.split_off(room.min(self.frame.due.len()));
         let due = std::mem::replace(&mut self.frame.due, later);
         for part in &due {
@@ -290,17 +302,8 @@ impl Full {
         }
         let mut answers = Vec::new();
         pen.round_trip(&mut answers)?;
-        let mut fates = vec![Fate::Unasked; candidates.len()];
-        let mut start = 0;
-        for (&end, answer) in ends.iter().zip(&answers) {
-            fates[start..end].fill(match (answer.visible, end - start) {
-                (false, _) => Fate::Hidden,
-                (true, 1) => Fate::Shows,
-                (true, _) => Fate::Again,
-            });
-            start = end;
-        }
-        for (part, answer) in due.iter().zip(&answers[ends.len()..]) {
+        let (first, second) = answers.split_at(groups.len());
+        for (part, answer) in due.iter().zip(second) {
             if answer.visible {
                 self.seen(view, part.item);
                 self.frame.opened.show(part.place);
@@ -308,23 +311,60 @@ impl Full {
                 self.hidden(view, part.item);
             }
         }
-        for (candidate, fate) in candidates.into_iter().zip(fates) {
-            let trusted =
-                self.knobs.after_group == AfterGroup::Trust && self.scenery.is_part(candidate.item);
-            match fate {
-                Fate::Unasked => self.frame.candidates.push(candidate),
-                Fate::Again if !trusted => {
-                    self.frame.candidates.push(Candidate { alone: true, ..candidate });
+        for (Group { nodes, rest }, answer) in groups.into_iter().zip(first) {
+            if answer.visible {
+                self.some_show(view, pen, nodes);
+                if !rest.is_empty() {
+                    self.frame.groups.push(Group { nodes: rest, ..Group::default() });
                 }
-                Fate::Hidden => self.hidden(view, candidate.item),
-                Fate::Shows | Fate::Again => {
-                    self.seen(view, candidate.item);
-                    self.open(view, pen, candidate.item, candidate.parent, true);
-                    self.walk(view, pen);
-                }
+            } else {
+                nodes.iter().for_each(|node| self.hidden(view, node.item));
+                self.some_show(view, pen, rest);
             }
         }
         Ok(())
+    }
+
+    /// What is left of groups, and groups of the candidates whose turn it is.
+    fn next_groups(&mut self) -> Vec<Group> {
+        let mut groups = std::mem::take(&mut self.frame.groups);
+        let candidates = std::mem::take(&mut self.frame.candidates);
+        let new_depth = |c: &Candidate| c.chance.is_none().then_some(c.depth);
+        let (candidates, later) = next_layer(candidates, self.frame.drawn_parts, new_depth);
+        self.frame.candidates = later;
+        let unknown = group::chance_of_staying_hidden(0);
+        let chances: Vec<f64> = candidates.iter().map(|c| c.chance.unwrap_or(unknown)).collect();
+        let (mut candidates, mut start) = (candidates.into_iter(), 0);
+        for end in group::runs(&chances, self.knobs.most_together) {
+            let nodes = candidates.by_ref().take(end - start).collect();
+            groups.push(Group { nodes, ..Group::default() });
+            start = end;
+        }
+        groups
+    }
+
+    /// Walks what shows among `nodes`, of which at least one does, or asks further.
+    fn some_show(&mut self, view: &View<'_>, pen: &mut Pen<'_>, mut nodes: Vec<Candidate>) {
+        if nodes.len() > 1 {
+            if self.knobs.after_group == AfterGroup::AskAgain {
+                let alone = |node| Group { nodes: vec![node], ..Group::default() };
+                self.frame.groups.extend(nodes.into_iter().map(alone));
+                return;
+            }
+            let others = nodes.extract_if(.., |node| !self.scenery.is_part(node.item));
+            let mut others: Vec<Candidate> = others.collect();
+            if !others.is_empty() {
+                // Where nothing is taken for what shows, it is in one half or the other.
+                let half = if nodes.is_empty() { others.len() / 2 } else { others.len() };
+                let rest = others.split_off(half);
+                self.frame.groups.push(Group { nodes: others, rest });
+            }
+        }
+        for node in nodes {
+            self.seen(view, node.item);
+            self.open(view, pen, node.item, node.parent, true);
+            self.walk(view, pen);
+        }
     }
 
     /// Pulls visibility up: what was opened and shows nothing counts as hidden from the next frame on.
@@ -348,17 +388,6 @@ impl Full {
     }
 }
 
-/// What became of a candidate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Fate {
-    /// There was no room for it.
-    Unasked,
-    Hidden,
-    Shows,
-    /// Something in its group shows.
-    Again,
-}
-
 impl Culler for Full {
     fn name(&self) -> &str {
         self.knobs.name
@@ -369,7 +398,7 @@ impl Culler for Full {
         self.frame = Frame::default();
         self.frame.stack.push((Item::Scene(NodeId(0)), NO_PARENT));
         self.walk(view, pen);
-        while !(self.frame.candidates.is_empty() && self.frame.due.is_empty()) {
+        while !self.frame.settled() {
             self.batch(view, pen)?;
         }
         self.pull_up(view);

@@ -18,7 +18,7 @@
 //! overlap much, as in a dense crowd, there are thousands of passes. The paper's device was polled and
 //! had no such price.
 
-use super::scenery::Appearance;
+use super::scenery::{Appearance, NodeHistory};
 use super::{Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, View};
 use crate::index::NodeId;
 use crate::math::PixelRectangle;
@@ -49,6 +49,12 @@ struct History {
     streak: u8,
     /// The first frame in which to ask again.
     ask_from: u32,
+}
+
+impl NodeHistory for History {
+    fn inherit(&mut self, below: &Self) {
+        self.visible_after = self.visible_after.max(below.visible_after);
+    }
 }
 
 /// Where an active node stands.

@@ -32,7 +32,7 @@ pub use full::{AfterGroup, Full, FullKnobs};
 pub use full_waits::{FullWaits, FullWaitsKnobs};
 pub use pen::{Counts, Pen};
 pub use postponement::Postponement;
-pub use scenery::{Item, Scenery, SceneryKnobs, Weight};
+pub use scenery::{Item, NodeHistory, Scenery, SceneryKnobs, Weight};
 pub use simple::Simple;
 pub use view::{ObjectView, View};
 pub use view_frustum::ViewFrustum;

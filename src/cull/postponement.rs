@@ -7,7 +7,8 @@ pub enum Postponement {
     /// In every frame.
     Never,
     /// The more "visible" answers in a row, the more frames to wait. The paper draws the curve without
-    /// numbers; this one doubles, less one, up to fifteen frames.
+    /// numbers; this one doubles, less one, up to thirty-one frames:
+    /// so the plant asks as seldom, beside `simple`, as the paper's culler does (Table 1).
     #[default]
     Figure3,
     /// Long from the first answer on, for devices on which a question is dear: fewer questions, more
@@ -23,8 +24,8 @@ impl Postponement {
     pub fn wait(self, streak: u8) -> u32 {
         let curve: &[u32] = match self {
             Self::Never => &[0],
-            Self::Figure3 => &[0, 1, 3, 7, 15],
-            Self::Seldom => &[14, 56],
+            Self::Figure3 => &[0, 1, 3, 7, 15, 31],
+            Self::Seldom => &[14, 62],
         };
         curve[usize::from(streak).min(curve.len() - 1)]
     }
@@ -47,6 +48,6 @@ mod tests {
             assert!(waits.is_sorted(), "{policy:?}");
         }
         assert_eq!(Postponement::Never.wait(200), 0);
-        assert_eq!((Postponement::Figure3.wait(0), Postponement::Figure3.wait(99)), (0, 15));
+        assert_eq!((Postponement::Figure3.wait(0), Postponement::Figure3.wait(99)), (0, 31));
     }
 }

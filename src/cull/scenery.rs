@@ -43,6 +43,26 @@ pub struct Weight {
     pub triangles: u64,
 }
 
+/// What a culler remembers of a node from frame to frame; the default is for a node that nothing is
+/// known of.
+pub trait NodeHistory: Clone + Default {
+    /// A node that the index made anew takes over what is known of one below it: it was visible if that
+    /// was. What was hidden is not passed on: it says nothing of the whole.
+    fn inherit(&mut self, below: &Self);
+}
+
+/// Nothing.
+impl NodeHistory for () {
+    fn inherit(&mut self, (): &Self) {}
+}
+
+/// One more than the last frame in which the node was visible; 0 for never.
+impl NodeHistory for u32 {
+    fn inherit(&mut self, below: &Self) {
+        *self = (*self).max(*below);
+    }
+}
+
 /// The two levels, with the bounds that a frame needs.
 pub struct Scenery {
     index: Box<dyn Index>,
@@ -124,13 +144,11 @@ impl Scenery {
     }
 
     /// Relinks what moved, renews the bounds of inner nodes, and makes `history` fit: as many entries
-    /// as there are slots, and the default for nodes that the index made anew.
-    pub fn begin_frame<H: Clone + Default>(&mut self, view: &View<'_>, history: &mut Vec<H>) {
+    /// as there are slots; nodes that the index made anew inherit from what is below them.
+    pub fn begin_frame<M: NodeHistory>(&mut self, view: &View<'_>, history: &mut Vec<M>) {
         self.index.update(view.moves);
-        history.resize(self.slot_count(), H::default());
-        for &node in self.index.rebuilt() {
-            history[(self.object_slots + node.0) as usize] = H::default();
-        }
+        history.resize(self.slot_count(), M::default());
+        self.pass_on(history);
         let count = self.index.node_count() as usize;
         self.node_error.clear();
         self.node_error.resize(count, ClipError::ZERO);
@@ -149,6 +167,33 @@ impl Scenery {
                 let parent = parent.0 as usize;
                 self.node_error[parent] = self.node_error[parent].max(&error);
                 self.node_weight[parent].add(weight);
+            }
+        }
+    }
+
+    /// Forgets what was remembered under the numbers of nodes that the index made anew, and takes over
+    /// what is known of the objects in them.
+    fn pass_on<M: NodeHistory>(&self, history: &mut [M]) {
+        let rebuilt = self.index.rebuilt();
+        if rebuilt.is_empty() {
+            return;
+        }
+        let mut anew = vec![false; self.index.node_count() as usize];
+        for &node in rebuilt {
+            anew[node.0 as usize] = true;
+            history[self.slot(Item::Scene(node))] = M::default();
+        }
+        for &node in self.index.top_down().iter().rev() {
+            let slot = self.slot(Item::Scene(node));
+            if anew[node.0 as usize] {
+                for &object in self.index.node(node).objects {
+                    let below = history[self.slot(Item::Object(object, 0))].clone();
+                    history[slot].inherit(&below);
+                }
+            }
+            if let Some(parent) = self.index.parent(node).filter(|p| anew[p.0 as usize]) {
+                let below = history[slot].clone();
+                history[self.slot(Item::Scene(parent))].inherit(&below);
             }
         }
     }

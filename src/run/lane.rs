@@ -45,7 +45,8 @@ pub struct Lane<'a> {
     /// Who watches.
     pub observer: &'a mut dyn Observer,
     /// Whether to measure as well how long the device takes for the truth's visible parts alone. Not
-    /// done where its memory is limited: it would change what is resident.
+    /// done where its memory is limited: it would change what is resident. Lanes share one measurement a
+    /// frame.
     pub with_bound: bool,
 }
 
@@ -115,16 +116,15 @@ pub fn run(
     for t in 0..frames {
         let state = FrameState::at(world, t);
         let truth = Truth::of(world, &state);
-        let mut everything: Option<ReadBack> = None;
+        let (mut everything, mut bound): (Option<ReadBack>, Option<u64>) = (None, None);
         for ((lane, culler), trace) in lanes.iter_mut().zip(&mut cullers).zip(&mut traces) {
             let shot = shoot(world, &state, truth_facts(&truth), lane, culler.as_mut())?;
             observe(world, &state, &truth, lane, &shot, &mut everything)?;
-            let visible_wall_ns = match lane.info.device {
-                Some(_) if lane.with_bound && world.memory.is_none() => {
-                    Some(draw_visible(world, &state, &truth, lane.oracle.as_mut())?)
-                }
-                _ => None,
-            };
+            let bounded = lane.info.device.is_some() && lane.with_bound && world.memory.is_none();
+            if bounded && bound.is_none() {
+                bound = Some(draw_visible(world, &state, &truth, lane.oracle.as_mut())?);
+            }
+            let visible_wall_ns = bound.filter(|_| bounded);
             trace.frames.push(FrameTrace { visible_wall_ns, ..shot.trace });
             if !tick() {
                 return Err(RunError::Interrupted);
@@ -217,15 +217,12 @@ fn observe(
     shot: &Shot,
     everything: &mut Option<ReadBack>,
 ) -> Result<(), OracleError> {
-    let mut sorted = shot.drawn.clone();
-    sorted.sort_unstable();
-    let redrawn = if lane.info.device.is_some() { lane.oracle.redraw(&sorted)? } else { None };
-    if redrawn.is_some() && everything.is_none() {
+    if lane.info.device.is_some() && everything.is_none() {
         let all: Vec<PartId> = (0..world.partition.part_count()).map(PartId).collect();
         *everything = lane.oracle.redraw(&all)?;
     }
-    let device = match (&shot.own, &redrawn, &*everything) {
-        (Some(own), Some(drawn), Some(all)) => Some(DeviceImages { own, drawn, all }),
+    let device = match (&shot.own, &*everything) {
+        (Some(own), Some(all)) if lane.info.device.is_some() => Some(DeviceImages { own, all }),
         _ => None,
     };
     let counts: Counts = shot.trace.counts;

@@ -9,8 +9,6 @@ use crate::part::PartId;
 pub struct DeviceImages<'a> {
     /// What the culler's own draws left.
     pub own: &'a ReadBack,
-    /// The drawn parts again, in draw-index order.
-    pub drawn: &'a ReadBack,
     /// Every part, in draw-index order.
     pub all: &'a ReadBack,
 }

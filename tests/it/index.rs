@@ -1,10 +1,15 @@
 //! Every index keeps its promises after every step, and hides nothing from a traversal.
 
 use glam::DVec3;
+use plainsight::cull::{CullerSetup, Item, ProxyKind, Scenery, SceneryKnobs};
 use plainsight::index::{Entry, INDEXES, Index, Move, NodeId};
 use plainsight::math::Aabb;
+use plainsight::oracle::CostModel;
 use plainsight::part::ObjectId;
+use plainsight::run::FrameState;
 use plainsight::scene::Stream;
+
+use crate::common::world;
 
 fn random_box(stream: &mut Stream, reach: f64) -> Aabb {
     let mut point =
@@ -90,4 +95,46 @@ fn the_nearer_child_comes_first() {
             |node: NodeId| (index.node(node).query_box.unwrap().center().x - eye.x).abs();
         assert!(distance(children[0]) < distance(children[1]));
     }
+}
+
+/// Whether an object below `node` was visible in the frame before, by `history`.
+fn any_below(index: &dyn Index, node: NodeId, visible: &dyn Fn(ObjectId) -> bool) -> bool {
+    let mut children = Vec::new();
+    index.children(node, DVec3::ZERO, &mut children);
+    index.node(node).objects.iter().any(|&object| visible(object))
+        || children.into_iter().any(|child| any_below(index, child, visible))
+}
+
+/// What a culler knows of the objects is not lost when the index builds a subtree anew.
+#[test]
+fn rebuilt_nodes_inherit_what_was_visible() {
+    let world = world("bunnies", 1, 0.3, 40);
+    let entries = world.entries();
+    // Both go the same way, so the one tells what the other did.
+    let build = || (INDEXES[0].build)(&entries);
+    let (mut beside, index) = (build(), build());
+    let (partition, proxy, cost) =
+        (world.partition.clone(), ProxyKind::Rectangle, CostModel::lavapipe());
+    let setup = CullerSetup { partition, index, proxy, cost };
+    let mut scenery = Scenery::new(setup, SceneryKnobs::default());
+    let mut visible_after: Vec<u32> = Vec::new();
+    let (mut inherited, mut forgotten) = (0, 0);
+    for t in 0..40 {
+        let state = FrameState::at(&world, t);
+        scenery.begin_frame(&state.view(&world), &mut visible_after);
+        beside.update(&state.moves);
+        let of = |item| visible_after[scenery.slot(item)];
+        for &node in beside.rebuilt() {
+            let visible = |object| of(Item::Object(object, 0)) == t;
+            let expected = any_below(beside.as_ref(), node, &visible);
+            assert_eq!(of(Item::Scene(node)) == t, expected, "frame {t} {node:?}");
+            inherited += u32::from(expected);
+            forgotten += u32::from(!expected);
+        }
+        // Every third object is visible, others from frame to frame.
+        for object in (0..entries.len() as u32).filter(|object| (object + t) % 3 == 0) {
+            visible_after[scenery.slot(Item::Object(ObjectId(object), 0))] = t + 1;
+        }
+    }
+    assert!(inherited > 20 && forgotten > 20, "{inherited} {forgotten}");
 }
