@@ -32,7 +32,9 @@ mod draw;
 pub mod fast;
 mod image;
 pub mod naive;
+mod tolerance;
 mod window;
 
 pub use draw::{Draw, Faces};
 pub use image::{Image, Viewport};
+pub use tolerance::{Fate, Fates, Tolerance, fates};

@@ -144,7 +144,7 @@ pub fn judge(
     let oracle: Box<dyn Oracle> = Box::new(Sim::new(stage));
     let name = culler().name().to_owned();
     let replay = format!("scene {} seed {} culler {name}", world.scene.name, world.scene.seed);
-    let info = LaneInfo { culler: name, oracle: oracle.name(), device: None, replay };
+    let info = LaneInfo::of(name, oracle.as_ref(), replay);
     let mut gate = Gate::default();
     let (culler, observer) = (Box::new(culler), &mut gate);
     let lane = Lane { info, culler, oracle, observer, with_bound: false };

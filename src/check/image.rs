@@ -1,6 +1,7 @@
-//! **image**: the reference's image of the drawn parts equals its image of all parts, bit for bit.
+//! **image**: the reference's image of the drawn parts equals its image of all parts, bit for bit. On a
+//! device with a tolerance, only where no device within it could show another part.
 
-use plainsight_reference::Image;
+use plainsight_reference::{Image, Tolerance};
 
 use crate::run::{FrameRecord, render};
 
@@ -49,9 +50,17 @@ impl ImageCheck {
         let image = self.image.get_or_insert_with(|| Image::new(record.world.scene.viewport));
         render(record.world, record.state, record.drawn, image);
         let all = &record.truth.image;
-        if image != all {
-            self.differences.extend(Difference::find(record, |i| image.word(i) != all.word(i)));
+        if image == all {
+            return;
         }
+        if record.lane.tolerance == Tolerance::EXACT {
+            self.differences.extend(Difference::find(record, |i| image.word(i) != all.word(i)));
+            return;
+        }
+        let decided = &record.fates().decided;
+        let shown = |i| image.draw_index(i).map(|draw| record.world.partition.part_of_draw(draw).0);
+        let differ = |i: usize| decided[i].is_some_and(|part| shown(i) != Some(part));
+        self.differences.extend(Difference::find(record, differ));
     }
 
     /// The frames that differ.

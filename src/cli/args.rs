@@ -9,8 +9,8 @@ use crate::cull::ProxyKind;
 use crate::oracle::{MIB, MemoryKnobs};
 use crate::part::{Crossing, PartitionKnobs};
 use crate::run::CalibrationKnobs;
-use crate::scene::Viewport;
 use crate::scene::generate::{CameraMode, Knobs};
+use crate::scene::{Scene, Viewport};
 
 /// A test bench for visibility culling: nothing in plain sight may be culled.
 #[derive(Parser)]
@@ -74,16 +74,15 @@ pub(super) struct SceneArgs {
     /// Pixels, WIDTHxHEIGHT (default 1280x1024).
     #[arg(long, value_parser = viewport)]
     pub(super) viewport: Option<Viewport>,
-    /// An OBJ model: in the place of the blob in bunnies, or the scene `model` itself.
-    #[arg(long, value_name = "FILE.obj")]
+    /// A model (.obj, .gltf, .glb, .ply): in the place of the blob in bunnies, or the scene `model` itself.
+    #[arg(long, value_name = "FILE")]
     pub(super) mesh: Option<PathBuf>,
     /// Where the camera of the scene `model` goes.
     #[arg(long, value_enum)]
     pub(super) camera: Option<CameraArg>,
-    /// Most triangles in a part.
-    #[arg(long, default_value_t = PartitionKnobs::default().leaf_triangles,
-        value_parser = clap::value_parser!(u32).range(1..))]
-    pub(super) leaf: u32,
+    /// Most triangles in a part (default 3072, in hard scenes 48).
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) leaf: Option<u32>,
     /// What becomes of a triangle between two parts.
     #[arg(long, value_enum, default_value_t = PartsArg::Split)]
     pub(super) parts: PartsArg,
@@ -307,13 +306,18 @@ fn simd(text: &str) -> Result<SimdLevel, String> {
 }
 
 impl SceneArgs {
-    /// How meshes become parts.
-    pub(super) fn partition(&self) -> PartitionKnobs {
+    /// Most triangles in a part of `scene`.
+    pub(super) fn leaf_triangles(&self, scene: &Scene) -> u32 {
+        self.leaf.unwrap_or(scene.leaf_triangles)
+    }
+
+    /// How the meshes of `scene` become parts.
+    pub(super) fn partition(&self, scene: &Scene) -> PartitionKnobs {
         let crossing = match self.parts {
             PartsArg::Split => Crossing::Split,
             PartsArg::Whole => Crossing::Whole,
         };
-        PartitionKnobs { leaf_triangles: self.leaf, crossing }
+        PartitionKnobs { leaf_triangles: self.leaf_triangles(scene), crossing }
     }
 
     /// How the reference renderer draws.
@@ -364,8 +368,7 @@ impl SceneArgs {
         add("mesh", self.mesh.as_ref().map(|path| path.display().to_string()));
         let camera = |c: CameraArg| if c == CameraArg::Inside { "inside" } else { "orbit" };
         add("camera", self.camera.map(|c| camera(c).to_owned()));
-        let leaf = (self.leaf != PartitionKnobs::default().leaf_triangles).then_some(self.leaf);
-        add("leaf", leaf.map(|leaf| leaf.to_string()));
+        add("leaf", self.leaf.map(|leaf| leaf.to_string()));
         add("parts", (self.parts == PartsArg::Whole).then(|| "whole".to_owned()));
         add("index", (self.index != "two-level-bsp").then(|| self.index.clone()));
         add("proxy", (self.proxy == ProxyArg::Box).then(|| "box".to_owned()));

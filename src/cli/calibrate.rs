@@ -87,7 +87,7 @@ fn worlds(
 ) -> Result<[World; 2], CliError> {
     let cache = pick_cache(&args.scene_args)?;
     let coarse = &args.scene_args;
-    let leaf = (coarse.leaf / FINER).max(1);
+    let leaf = Some((coarse.leaf_triangles(named.scene()) / FINER).max(1));
     let fine = SceneArgs { leaf, parts: PartsArg::Whole, full_size: false, ..coarse.clone() };
     let again = Named::open(&args.scene, &fine)?;
     let mut world =

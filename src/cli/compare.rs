@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use super::args::{CompareArgs, SceneArgs};
 use super::progress::progress_bar;
 use super::run::{
-    Finished, Named, Oracles, Plan, REPEAT, catch_interrupt, pick_cache, pick_cost, pick_cullers,
-    pick_index, tell_failures,
+    Finished, Named, Oracles, Plan, REPEAT, catch_interrupt, matching, pick_cache, pick_cost,
+    pick_cullers, pick_index, tell_failures,
 };
 use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
 use crate::cull::CullerKind;
@@ -36,15 +36,16 @@ fn cases(args: &CompareArgs) -> Result<Vec<Case>, CliError> {
     } else {
         args.scene.iter().map(String::as_str).collect()
     };
+    let names = matching(&names)?;
     let mut cases: Vec<Case> = Vec::new();
-    for name in names {
-        let known = FULL_LEAVES.iter().find(|(scene, _)| *scene == name);
+    for name in &names {
+        let known = FULL_LEAVES.iter().find(|(scene, _)| scene == name);
         let leaves = match known {
             Some((_, leaves)) if args.scene_args.full_size && args.leaves.is_empty() => {
-                leaves.to_vec()
+                leaves.iter().copied().map(Some).collect()
             }
             _ if args.leaves.is_empty() => vec![args.scene_args.leaf],
-            _ => args.leaves.clone(),
+            _ => args.leaves.iter().copied().map(Some).collect(),
         };
         let alone = leaves.len() == 1;
         for leaf in leaves {
@@ -52,7 +53,7 @@ fn cases(args: &CompareArgs) -> Result<Vec<Case>, CliError> {
             let named = Named::open(name, &scene_args)?;
             let mut label = label(name, &named, &scene_args);
             if !alone {
-                label += &format!("-{leaf}");
+                label += &format!("-{}", scene_args.leaf_triangles(named.scene()));
             }
             // Files of the same stem in two folders, or a scene named twice.
             let (once, mut number) = (label.clone(), 1);
@@ -125,7 +126,7 @@ pub(super) fn compare(
                 world.scene.triangle_count(),
                 world.partition.fragment_count(),
                 world.partition.part_count(),
-                case.args.leaf,
+                case.args.leaf_triangles(&world.scene),
                 world.scene.frames,
                 how_made(&world.made),
                 world.build_seconds,

@@ -5,19 +5,25 @@ use crate::cull::CullerKind;
 use crate::index::INDEXES;
 use crate::oracle::CostModel;
 use crate::oracle::wgpu::{Gpu, NO_DEVICE};
-use crate::scene::generate::GENERATORS;
+use crate::scene::generate::{GENERATORS, HARD};
 
 pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<u8, CliError> {
     let out = &mut streams.out;
     let mut section = |title: &str, lines: Vec<(String, String)>| -> std::io::Result<()> {
         writeln!(out, "{title}")?;
-        lines.iter().try_for_each(|(name, summary)| writeln!(out, "  {name:<14} {summary}"))
+        let wide = lines.iter().map(|(name, _)| name.len()).max().unwrap_or(0).max(14);
+        lines.iter().try_for_each(|(name, summary)| writeln!(out, "  {name:<wide$} {summary}"))
     };
     let pair = |name: &str, summary: &str| (name.to_owned(), summary.to_owned());
     section("scenes", GENERATORS.iter().map(|g| pair(g.name, g.summary)).collect())?;
+    section("hard scenes", HARD.iter().map(|g| pair(g.name, g.summary)).collect())?;
     section("cullers", cullers.iter().map(|c| pair(c.name, c.summary)).collect())?;
     let oracles = [
         ("sim", "the reference z-buffer, exact and at once"),
+        (
+            "hierarchical-z",
+            "the reference's depth as a pyramid of maxima, a handful of texels a question",
+        ),
         ("hardware", "occlusion queries of a Vulkan device through wgpu"),
         (
             "pyramid",

@@ -12,7 +12,7 @@ use crate::check::Gate;
 use crate::cull::{Culler, CullerKind, CullerSetup};
 use crate::index::{Entry, INDEXES, IndexKind};
 use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
-use crate::oracle::{Always, CostModel, Oracle, OracleError, Questions, Sim, Stage};
+use crate::oracle::{Always, CostModel, HierarchicalZ, Oracle, OracleError, Questions, Sim, Stage};
 use crate::part::{Cache, PartId};
 use crate::report::{Row, table};
 use crate::run::{
@@ -48,8 +48,10 @@ pub(super) struct Oracles {
 impl Oracles {
     /// Whether every name is one of an oracle.
     pub(super) fn known(names: &[String]) -> Result<(), CliError> {
-        let known: Vec<&str> =
-            ["sim", "always"].into_iter().chain(Questions::ALL.map(Questions::name)).collect();
+        let known: Vec<&str> = ["sim", "hierarchical-z", "always"]
+            .into_iter()
+            .chain(Questions::ALL.map(Questions::name))
+            .collect();
         names.iter().find(|name| !known.contains(&name.as_str())).map_or(Ok(()), |name| {
             let what = format!("no oracle is called '{name}'; there are {}", known.join(", "));
             Err(CliError::Usage(what))
@@ -115,6 +117,7 @@ impl StagedOracles<'_> {
     pub(super) fn make(&self, name: &str) -> Result<Box<dyn Oracle>, OracleError> {
         match name {
             "sim" => Ok(Box::new(Sim::new(self.stage.clone()))),
+            "hierarchical-z" => Ok(Box::new(HierarchicalZ::new(self.stage.clone()))),
             "always" => Ok(Box::<Always>::default()),
             _ => {
                 let stage = self.gpu.as_ref().expect("hardware is named only where it was opened");
@@ -150,6 +153,12 @@ pub(super) fn pick_index(name: &str) -> Result<IndexKind, CliError> {
     })
 }
 
+/// The scenes that names with `*` stand for.
+pub(super) fn matching(names: &[&str]) -> Result<Vec<String>, CliError> {
+    let each = names.iter().map(|name| Ok(generate::matching(name)?));
+    Ok(each.collect::<Result<Vec<_>, CliError>>()?.concat())
+}
+
 /// A scene as the user named it. All are opened before any device, so that bad input is the first and
 /// only thing said.
 pub(super) struct Named {
@@ -161,6 +170,11 @@ impl Named {
     /// The scene of that name or file.
     pub(super) fn open(name: &str, args: &SceneArgs) -> Result<Self, CliError> {
         Ok(Self { name: name.to_owned(), scene: generate::open(name, &args.knobs())? })
+    }
+
+    /// The description.
+    pub(super) fn scene(&self) -> &Scene {
+        &self.scene
     }
 
     /// Whether `--mesh` decides what is seen in it.
@@ -181,7 +195,7 @@ impl Named {
     ) -> Result<World, CliError> {
         let message = format!("{}: object trees", self.name);
         let world = counting_triangles(bar, message, |progress| {
-            World::make(self.scene.clone(), args.partition(), cache, progress)
+            World::make(self.scene.clone(), args.partition(&self.scene), cache, progress)
         });
         let world = world.rendered(args.render());
         bar.suspend(|| {
@@ -273,12 +287,8 @@ impl Plan<'_> {
         let mut running: Vec<Lane<'_>> = Vec::new();
         for (&(oracle, kind), gate) in lanes.iter().zip(&mut gates) {
             let oracle = staged.make(oracle)?;
-            let info = LaneInfo {
-                culler: kind.name.to_owned(),
-                oracle: oracle.name(),
-                device: oracle.device(),
-                replay: self.replay_line(name, &world, kind.name, oracle.name()),
-            };
+            let replay = self.replay_line(name, &world, kind.name, oracle.name());
+            let info = LaneInfo::of(kind.name, oracle.as_ref(), replay);
             let culler = self.factory(kind, &world, &entries);
             let first = running.iter().all(|lane| lane.info.oracle != info.oracle);
             let with_bound = self.with_bound && first;
@@ -306,12 +316,7 @@ impl Plan<'_> {
         let entries = world.entries();
         let mut seen = LastDrawn(Vec::new());
         let oracle = staged.make(&staged.names[0])?;
-        let info = LaneInfo {
-            culler: self.cullers[0].name.to_owned(),
-            oracle: oracle.name(),
-            device: None,
-            replay: String::new(),
-        };
+        let info = LaneInfo::of(self.cullers[0].name, oracle.as_ref(), String::new());
         let culler = self.factory(self.cullers[0], world, &entries);
         let lane = Lane { info, culler, oracle, observer: &mut seen, with_bound: false };
         bar.inc_length(u64::from(last) + 1);
@@ -371,11 +376,12 @@ pub(super) fn run(
     } else {
         args.scene.iter().map(String::as_str).collect()
     };
+    let names = matching(&names)?;
     let mut scene_args = args.scene_args.clone();
     if args.scene.is_empty() {
         scene_args.frames = scene_args.frames.or(Some(DEFAULT_RUN_FRAMES));
     }
-    let open = |name: &&str| Named::open(name, &scene_args);
+    let open = |name: &String| Named::open(name, &scene_args);
     let (chosen, index) =
         (pick_cullers(&args.culler, cullers)?, pick_index(&args.scene_args.index)?);
     Oracles::known(&args.oracle)?;

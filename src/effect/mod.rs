@@ -2,18 +2,23 @@
 //! the scene declares it and is a pure function of (scene, t). It must not know indexes or oracles.
 
 mod motion;
+mod teleport;
 
 use std::sync::Arc;
 
 use crate::scene::{Placement, Scene};
 
 use motion::MotionEffect;
+use teleport::TeleportEffect;
 
 /// A scene with the effects that it declares.
 #[derive(Debug)]
 pub struct World {
     scene: Arc<Scene>,
     motion: Option<MotionEffect>,
+    teleport: Option<TeleportEffect>,
+    /// Objects that some effect moves, ascending.
+    moving: Vec<u32>,
 }
 
 impl World {
@@ -21,7 +26,13 @@ impl World {
     #[must_use]
     pub fn new(scene: &Arc<Scene>) -> Self {
         let motion = scene.effects.motion.as_ref().map(MotionEffect::new);
-        Self { scene: Arc::clone(scene), motion }
+        let teleport = scene.effects.teleport.as_ref().map(TeleportEffect::new);
+        let mut moving: Vec<u32> = Vec::new();
+        moving.extend(motion.iter().flat_map(|motion| motion.moving()));
+        moving.extend(teleport.iter().flat_map(|teleport| teleport.jumping()));
+        moving.sort_unstable();
+        moving.dedup();
+        Self { scene: Arc::clone(scene), motion, teleport, moving }
     }
 
     /// Where an object stands at frame `t`.
@@ -31,16 +42,27 @@ impl World {
     #[must_use]
     pub fn placement(&self, object: u32, t: u32) -> Placement {
         let rest = self.scene.objects[object as usize].placement;
-        self.motion.as_ref().map_or(rest, |motion| motion.placement(object, rest, t))
+        let placement =
+            self.motion.as_ref().map_or(rest, |motion| motion.placement(object, rest, t));
+        let Some(teleport) = &self.teleport else { return placement };
+        let translation = placement.translation + teleport.offset(object, t);
+        Placement { translation, ..placement }
     }
 
     /// Ids of the objects that some effect moves, ascending.
     #[must_use]
     pub fn moving(&self) -> &[u32] {
-        self.motion.as_ref().map_or(&[], MotionEffect::moving)
+        &self.moving
     }
 
-    /// The farthest an object's origin moves in one frame, world units; 0 for one that stands still.
+    /// Whether an object may have gone farther from frame `t` − 1 to `t` than its step bound.
+    #[must_use]
+    pub fn jumped(&self, object: u32, t: u32) -> bool {
+        self.teleport.as_ref().is_some_and(|teleport| teleport.jumped(object, t))
+    }
+
+    /// The farthest an object's origin moves in one frame without a jump, world units; 0 for one that
+    /// stands still.
     #[must_use]
     pub fn step_bound(&self, object: u32) -> f64 {
         self.motion.as_ref().map_or(0.0, |motion| motion.step_bound(object))

@@ -22,8 +22,9 @@ pub const CLIP_ERROR_GAMMA: f64 = ROUNDINGS * F32_ROUNDOFF / (1.0 - ROUNDINGS * 
 /// the second product of view and projection as often again: eight units of the *absolute* product,
 /// which stays large where a camera and an object far from the origin cancel.
 const COMPOSITION_GAMMA: f64 = 8.0 * F64_ROUNDOFF / (1.0 - 8.0 * F64_ROUNDOFF);
-/// Gradual underflow adds at most 2⁻¹⁵⁰ a rounding in f32; 2⁻¹⁴⁰ covers all of [`ROUNDINGS`].
-const UNDERFLOW: f64 = 1.0 / ((1_u128 << 70) as f64 * (1_u128 << 70) as f64);
+/// A number below 2⁻¹²⁶ may be flushed to zero on a device, and loses bits in f32 itself: a matrix entry
+/// by this times the coordinate that it meets, a sum by this alone. 2⁻¹²⁰ covers all of [`ROUNDINGS`].
+const UNDERFLOW: f64 = 1.0 / ((1_u128 << 60) as f64 * (1_u128 << 60) as f64);
 
 /// Absolute bounds on the error of the four clip coordinates of anything inside a box.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -47,7 +48,9 @@ impl ClipError {
         let rounded = absolute(&product) * reach;
         let composed = magnitude * reach;
         let bound = std::array::from_fn(|i| {
-            CLIP_ERROR_GAMMA * rounded[i] + COMPOSITION_GAMMA * composed[i] + UNDERFLOW
+            CLIP_ERROR_GAMMA * rounded[i]
+                + COMPOSITION_GAMMA * composed[i]
+                + UNDERFLOW * reach.element_sum()
         });
         Self { bound }
     }

@@ -11,6 +11,7 @@
 mod always;
 mod cost;
 mod fit;
+mod hierarchical_z;
 #[cfg(feature = "hardware")]
 mod maxima;
 mod proxy_mesh;
@@ -21,6 +22,7 @@ pub mod wgpu;
 
 use std::sync::Arc;
 
+use plainsight_reference::Tolerance;
 use plainsight_reference::fast::Options;
 
 use crate::part::{PartId, Partition};
@@ -29,6 +31,7 @@ use crate::scene::Viewport;
 pub use always::Always;
 pub use cost::{Amounts, CostModel};
 pub use fit::{FitError, Measurement};
+pub use hierarchical_z::HierarchicalZ;
 #[cfg(feature = "hardware")]
 use proxy_mesh::box_proxy_triangles;
 pub use residency::{Memory, MemoryKnobs, Residency, Step, least_budget, mesh_bytes};
@@ -192,6 +195,11 @@ pub trait Oracle {
     /// The adapter's name where a real device draws.
     fn device(&self) -> Option<String> {
         None
+    }
+
+    /// How far its images may stand from the reference's: what the device declares, to be held to.
+    fn tolerance(&self) -> Tolerance {
+        Tolerance::EXACT
     }
 
     /// What the frame so far meant for the device's memory, where that is limited.

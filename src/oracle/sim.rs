@@ -82,6 +82,12 @@ impl Sim {
         }
     }
 
+    /// The image as it is, with everything drawn so far.
+    pub(super) fn image(&mut self) -> &Image {
+        self.flush();
+        &self.image
+    }
+
     fn flush(&mut self) {
         let Self { stage, image, matrices, waiting, .. } = self;
         if !waiting.is_empty() {

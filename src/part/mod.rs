@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use cache::Got;
 
 use crate::math::Aabb;
-use crate::scene::{Mesh, Scene};
+use crate::scene::{LEAF_TRIANGLES, Mesh, Scene};
 
 pub use cache::{Cache, CacheError};
 pub use tree::{ObjectNode, ObjectTree};
@@ -46,7 +46,7 @@ pub enum Crossing {
 
 impl Default for PartitionKnobs {
     fn default() -> Self {
-        Self { leaf_triangles: 3072, crossing: Crossing::Split }
+        Self { leaf_triangles: LEAF_TRIANGLES, crossing: Crossing::Split }
     }
 }
 

@@ -8,6 +8,7 @@ use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, Rect, Stroke, Trans
 
 use crate::part::{ObjectId, PartId};
 use crate::run::{FrameState, Truth, World};
+use crate::scene::Lens;
 
 /// Pixels from the edge of the top view to what it shows.
 const MARGIN: f32 = 16.0;
@@ -125,15 +126,23 @@ fn frustum(
 ) {
     let camera = state.camera;
     let viewport = world.scene.viewport;
-    let half = crate::math::tan(camera.fov_y * 0.5) * f64::from(viewport.width)
-        / f64::from(viewport.height);
-    let right = camera.forward.cross(DVec3::Y).normalize_or_zero() * half;
+    let aspect = f64::from(viewport.width) / f64::from(viewport.height);
+    // The middle of a shifted frustum leans away from the view direction.
+    let lean = match camera.lens {
+        Lens::Perspective { shift, .. } => shift[0],
+        Lens::Orthographic { .. } => 0.0,
+    };
+    let right = camera.forward.cross(DVec3::Y).normalize_or_zero();
+    let edge = |side: f64, distance: f64| {
+        let half = camera.lens.height_at(distance) * 0.5 * aspect;
+        camera.eye + camera.forward * distance + right * ((side + lean) * half)
+    };
     let far = reach * 1.5;
     let mut path = PathBuilder::new();
     let (ex, ey) = place(camera.eye);
     for side in [-1.0, 1.0] {
-        let (x, y) = place(camera.eye + (camera.forward + right * side) * far);
-        path.move_to(ex, ey);
+        let ((from_x, from_y), (x, y)) = (place(edge(side, 0.0)), place(edge(side, far)));
+        path.move_to(from_x, from_y);
         path.line_to(x, y);
     }
     path.push_circle(ex, ey, 5.0);

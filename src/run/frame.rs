@@ -138,7 +138,8 @@ impl FrameState {
             .collect();
         let moved = |&object: &u32| {
             let bounds = objects[object as usize].bounds;
-            Move { object: ObjectId(object), bounds, jumped: false }
+            let jumped = world.effects.jumped(object, t);
+            Move { object: ObjectId(object), bounds, jumped }
         };
         let moves =
             if t == 0 { Vec::new() } else { world.effects.moving().iter().map(moved).collect() };

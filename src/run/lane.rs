@@ -1,7 +1,10 @@
 //! Lanes: cullers with their oracles, run side by side over the same frames, so that each frame's
 //! truth is rendered once and kept no longer than the frame.
 
+use std::cell::OnceCell;
 use std::time::Instant;
+
+use plainsight_reference::Tolerance;
 
 use super::{
     DeviceImages, FrameRecord, FrameState, FrameTrace, HASH_START, Trace, Truth, World, fold,
@@ -19,8 +22,24 @@ pub struct LaneInfo {
     pub oracle: &'static str,
     /// The adapter's name where a real device draws.
     pub device: Option<String>,
+    /// How far the device's images may stand from the reference's.
+    pub tolerance: Tolerance,
     /// The line that replays the lane.
     pub replay: String,
+}
+
+impl LaneInfo {
+    /// Of a culler of that name beside `oracle`.
+    #[must_use]
+    pub fn of(culler: impl Into<String>, oracle: &dyn Oracle, replay: String) -> Self {
+        Self {
+            culler: culler.into(),
+            oracle: oracle.name(),
+            device: oracle.device(),
+            tolerance: oracle.tolerance(),
+            replay,
+        }
+    }
 }
 
 /// Looks at each finished frame of a lane.
@@ -226,8 +245,9 @@ fn observe(
         _ => None,
     };
     let counts: Counts = shot.trace.counts;
+    let (drawn, fates) = (shot.drawn.as_slice(), OnceCell::new());
     let record =
-        FrameRecord { lane: &lane.info, world, state, truth, drawn: &shot.drawn, counts, device };
+        FrameRecord { lane: &lane.info, world, state, truth, drawn, counts, device, fates };
     lane.observer.frame(&record);
     Ok(())
 }

@@ -12,7 +12,7 @@ pub use calibrate::{Bench, CalibrationKnobs, Workload, frames_to_measure, measur
 pub use frame::{FrameState, World};
 pub use lane::{Lane, LaneInfo, Observer, Repeat, RunError, run};
 pub use trace::{DeviceImages, FrameRecord, FrameTrace, Trace};
-pub use truth::{Truth, depth_complexity, partition_difference, render};
+pub use truth::{Truth, depth_complexity, fates_of_parts, partition_difference, render};
 
 /// FNV-1a over whole words with a rotation, the hash of everything a trace compares.
 #[must_use]

@@ -1,6 +1,10 @@
 //! The record of a run, and what observers are shown of each frame.
 
-use super::{FrameState, HASH_START, LaneInfo, Truth, World, fold};
+use std::cell::OnceCell;
+
+use plainsight_reference::Fates;
+
+use super::{FrameState, HASH_START, LaneInfo, Truth, World, fates_of_parts, fold};
 use crate::cull::Counts;
 use crate::oracle::{Amounts, Memory, ReadBack};
 use crate::part::PartId;
@@ -29,6 +33,16 @@ pub struct FrameRecord<'a> {
     pub counts: Counts,
     /// What a real device drew; `None` where none did.
     pub device: Option<DeviceImages<'a>>,
+    pub(super) fates: OnceCell<Fates>,
+}
+
+impl FrameRecord<'_> {
+    /// What the lane's device may make of each part, under its tolerance. Slow, and known only once
+    /// asked for: the exact truth settles nearly every frame.
+    #[must_use]
+    pub fn fates(&self) -> &Fates {
+        self.fates.get_or_init(|| fates_of_parts(self.world, self.state, self.lane.tolerance))
+    }
 }
 
 /// What is kept of one frame.

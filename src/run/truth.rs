@@ -1,7 +1,7 @@
 //! The truth of one frame: the reference's image of every part and what is visible in it.
 
 use plainsight_reference::fast::Instance;
-use plainsight_reference::{Image, fast};
+use plainsight_reference::{Draw, Fates, Image, Tolerance, fast, fates};
 
 use super::{FrameState, World};
 use crate::oracle::{part_draw, part_instance};
@@ -59,6 +59,15 @@ pub fn render(world: &World, state: &FrameState, parts: &[PartId], image: &mut I
     let instance = |&part: &PartId| part_instance(&world.partition, part, &state.matrices);
     let instances: Vec<Instance<'_>> = parts.iter().map(instance).collect();
     fast::render(image, &instances, world.render);
+}
+
+/// What a device within `tolerance` may make of each part of the frame, by part id; slow.
+#[must_use]
+pub fn fates_of_parts(world: &World, state: &FrameState, tolerance: Tolerance) -> Fates {
+    let parts = (0..world.partition.part_count()).map(PartId);
+    let draws: Vec<Draw<'_>> =
+        parts.map(|part| part_draw(&world.partition, part, &state.matrices)).collect();
+    fates(world.scene.viewport, &draws, tolerance)
 }
 
 /// How many triangles cover a sample on average, over the samples that any covers: all of them, near

@@ -5,18 +5,55 @@ use glam::{DMat4, DVec3, DVec4};
 use super::Viewport;
 use crate::math;
 
-/// A perspective camera at one frame.
+/// How a camera turns directions into places in the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lens {
+    /// Rays from the eye.
+    Perspective {
+        /// Full vertical field of view, radians in (0, π).
+        fov_y: f64,
+        /// Where the direction `forward` appears, from the middle of the picture: shares of half its
+        /// width (positive: to the left of the middle) and height (positive: below). Zero is the
+        /// symmetric frustum; one eye of a headset or a tile of a wall of screens has another.
+        shift: [f64; 2],
+    },
+    /// Parallel rays along `forward`. What is before the near plane is cut off as ever.
+    Orthographic {
+        /// World units from the bottom of the picture to its top, > 0.
+        height: f64,
+    },
+}
+
+impl Lens {
+    /// A symmetric perspective of full vertical field of view `fov_y`, radians in (0, π).
+    #[must_use]
+    pub const fn perspective(fov_y: f64) -> Self {
+        Self::Perspective { fov_y, shift: [0.0; 2] }
+    }
+
+    /// World units from the bottom of the picture to its top, `distance` along `forward`.
+    #[must_use]
+    pub fn height_at(&self, distance: f64) -> f64 {
+        match *self {
+            Self::Perspective { fov_y, .. } => 2.0 * math::tan(fov_y * 0.5) * distance,
+            Self::Orthographic { height } => height,
+        }
+    }
+}
+
+/// A camera at one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Position in the world.
     pub eye: DVec3,
     /// Unit view direction.
     pub forward: DVec3,
-    /// Full vertical field of view, radians in (0, π).
-    pub fov_y: f64,
+    /// How directions become places in the picture.
+    pub lens: Lens,
     /// Distance of the near plane along `forward`, > 0.
     pub near: f64,
-    /// Distance of the far plane, > near.
+    /// Distance of the far plane, > near. With a perspective it may be infinite: then nothing is too
+    /// far, and depth comes near 1 without reaching it.
     pub far: f64,
 }
 
@@ -35,16 +72,35 @@ impl Camera {
             DVec4::new(right.z, up.z, -f.z, 0.0),
             DVec4::new(-right.dot(self.eye), -up.dot(self.eye), f.dot(self.eye), 1.0),
         );
-        let scale_y = 1.0 / math::tan(self.fov_y * 0.5);
-        let scale_x = scale_y * f64::from(viewport.height) / f64::from(viewport.width);
-        let depth = self.far / (self.near - self.far);
-        let projection = DMat4::from_cols(
-            DVec4::new(scale_x, 0.0, 0.0, 0.0),
-            DVec4::new(0.0, scale_y, 0.0, 0.0),
-            DVec4::new(0.0, 0.0, depth, -1.0),
-            DVec4::new(0.0, 0.0, depth * self.near, 0.0),
-        );
-        projection * view
+        self.projection(viewport) * view
+    }
+
+    /// Clip from view space, whose z goes backwards.
+    fn projection(&self, viewport: Viewport) -> DMat4 {
+        let aspect = f64::from(viewport.height) / f64::from(viewport.width);
+        match self.lens {
+            Lens::Perspective { fov_y, shift } => {
+                let scale_y = 1.0 / math::tan(fov_y * 0.5);
+                // far / (near − far), which goes to −1.
+                let depth =
+                    if self.far.is_finite() { self.far / (self.near - self.far) } else { -1.0 };
+                DMat4::from_cols(
+                    DVec4::new(scale_y * aspect, 0.0, 0.0, 0.0),
+                    DVec4::new(0.0, scale_y, 0.0, 0.0),
+                    DVec4::new(shift[0], shift[1], depth, -1.0),
+                    DVec4::new(0.0, 0.0, depth * self.near, 0.0),
+                )
+            }
+            Lens::Orthographic { height } => {
+                let (scale_y, depth) = (2.0 / height, 1.0 / (self.near - self.far));
+                DMat4::from_cols(
+                    DVec4::new(scale_y * aspect, 0.0, 0.0, 0.0),
+                    DVec4::new(0.0, scale_y, 0.0, 0.0),
+                    DVec4::new(0.0, 0.0, depth, 0.0),
+                    DVec4::new(0.0, 0.0, depth * self.near, 1.0),
+                )
+            }
+        }
     }
 }
 
@@ -57,7 +113,17 @@ pub struct CameraPose {
     pub target: DVec3,
 }
 
-/// A camera flying through key poses, straight and at an even pace between two of them.
+/// How a camera gets from one pose to the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Travel {
+    /// Straight and at an even pace.
+    #[default]
+    Glide,
+    /// It stays at each pose and is at the next one a frame later: what was remembered is of no use.
+    Jump,
+}
+
+/// A camera's way through key poses.
 #[derive(Clone, Debug)]
 pub struct CameraPath {
     /// At least one pose. The first is at t = 0, the last at t = `duration`; the path is walked back
@@ -65,11 +131,13 @@ pub struct CameraPath {
     pub poses: Vec<CameraPose>,
     /// Frames from the first pose to the last, at least 1.
     pub duration: u32,
-    /// Full vertical field of view in radians.
-    pub fov_y: f64,
+    /// How it gets from pose to pose.
+    pub travel: Travel,
+    /// The camera's lens, the same at every t.
+    pub lens: Lens,
     /// Near plane distance.
     pub near: f64,
-    /// Far plane distance.
+    /// Far plane distance; see [`Camera::far`].
     pub far: f64,
 }
 
@@ -87,11 +155,14 @@ impl CameraPath {
         let along = f64::from(folded) / f64::from(duration) * (self.poses.len() - 1) as f64;
         let from = (along as usize).min(self.poses.len() - 1);
         let to = (from + 1).min(self.poses.len() - 1);
-        let part = along - from as f64;
+        let part = match self.travel {
+            Travel::Glide => along - from as f64,
+            Travel::Jump => 0.0,
+        };
         let mix = |a: DVec3, b: DVec3| a + (b - a) * part;
         let eye = mix(self.poses[from].eye, self.poses[to].eye);
         let target = mix(self.poses[from].target, self.poses[to].target);
         let forward = (target - eye).normalize();
-        Camera { eye, forward, fov_y: self.fov_y, near: self.near, far: self.far }
+        Camera { eye, forward, lens: self.lens, near: self.near, far: self.far }
     }
 }

@@ -18,8 +18,8 @@ use serde::Deserialize;
 
 use super::generate::{self, CameraMode, Knobs};
 use super::{
-    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path as Way, Placement, Scene,
-    SceneError, Viewport,
+    CameraPath, CameraPose, Effects, Jumps, Lens, Mesh, Motion, Object, Path as Way, Placement,
+    Scene, SceneError, Teleport, Travel, Viewport,
 };
 
 /// The only version there is.
@@ -37,6 +37,7 @@ struct SceneFile {
     full_size: bool,
     frames: Option<u32>,
     viewport: Option<[u32; 2]>,
+    leaf_triangles: Option<u32>,
     mesh: Option<PathBuf>,
     camera: Option<CameraName>,
     #[serde(default)]
@@ -61,7 +62,17 @@ struct InlineObject {
     #[serde(default)]
     rotation_y_degrees: f64,
     scale: Option<[f64; 3]>,
+    #[serde(default)]
+    shear: [f64; 3],
     reflect: Option<InlineReflect>,
+    jumps: Option<InlineJumps>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InlineJumps {
+    offsets: Vec<[f64; 3]>,
+    period: u32,
 }
 
 #[derive(Deserialize)]
@@ -74,11 +85,24 @@ struct InlineReflect {
     spin: f64,
 }
 
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum TravelName {
+    #[default]
+    Glide,
+    Jump,
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct InlinePath {
     poses: Vec<InlinePose>,
-    fov_y_degrees: f64,
+    #[serde(default)]
+    travel: TravelName,
+    fov_y_degrees: Option<f64>,
+    #[serde(default)]
+    shift: [f64; 2],
+    orthographic_height: Option<f64>,
     near: f64,
     far: f64,
 }
@@ -98,10 +122,21 @@ struct InlinePose {
 pub fn load(path: &Path, knobs: &Knobs) -> Result<Scene, SceneError> {
     let text = std::fs::read_to_string(path)
         .map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
+    parse(&text, path, knobs)
+}
+
+/// The same of a file's text; `path` is where it comes from, for messages and for models beside it.
+///
+/// # Errors
+/// As [`load`].
+pub fn parse(text: &str, path: &Path, knobs: &Knobs) -> Result<Scene, SceneError> {
     let refuse = |what: String| SceneError::File { path: path.to_owned(), what };
-    let file: SceneFile = toml::from_str(&text).map_err(|error| refuse(one_line(&text, &error)))?;
+    let file: SceneFile = toml::from_str(text).map_err(|error| refuse(one_line(text, &error)))?;
     if file.version != VERSION {
         return Err(refuse(format!("version {} is not known; write version = 1", file.version)));
+    }
+    if file.leaf_triangles == Some(0) {
+        return Err(refuse("leaf_triangles must be at least 1".to_owned()));
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     let camera = file.camera.map(|camera| match camera {
@@ -119,7 +154,10 @@ pub fn load(path: &Path, knobs: &Knobs) -> Result<Scene, SceneError> {
         camera: knobs.camera.or(camera),
     };
     match (&file.generator, file.objects.is_empty()) {
-        (Some(generator), true) => generate::build(generator, &merged),
+        (Some(generator), true) => generate::build(generator, &merged).map(|scene| Scene {
+            leaf_triangles: file.leaf_triangles.unwrap_or(scene.leaf_triangles),
+            ..scene
+        }),
         (None, false) => inline(file, &merged).map_err(refuse),
         (Some(_), false) => {
             Err(refuse("has a generator and objects; keep one of the two".to_owned()))
@@ -142,11 +180,12 @@ fn one_line(text: &str, error: &toml::de::Error) -> String {
 }
 
 fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
-    let chosen = knobs.chosen().map_err(|error| error.to_string())?;
+    let chosen = knobs.chosen(&generate::USUAL).map_err(|error| error.to_string())?;
     let path = file.camera_path.ok_or("inline objects need a [camera_path]")?;
-    let (mut meshes, mut objects, mut movers) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut meshes, mut objects) = (Vec::new(), Vec::new());
+    let (mut movers, mut jumpers) = (Vec::new(), Vec::new());
     for (number, object) in file.objects.into_iter().enumerate() {
-        let numbers = [object.translation, object.scale.unwrap_or([1.0; 3])];
+        let numbers = [object.translation, object.scale.unwrap_or([1.0; 3]), object.shear];
         if !(numbers.as_flattened().iter().all(|c| c.is_finite())
             && object.rotation_y_degrees.is_finite())
         {
@@ -158,6 +197,7 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
             translation: object.translation.into(),
             rotation: DQuat::from_rotation_y(object.rotation_y_degrees.to_radians()),
             scale: numbers[1].into(),
+            shear: object.shear.into(),
         };
         objects.push(Object { mesh: number as u32, placement });
         if let Some(InlineReflect { velocity, min, max, spin }) = object.reflect {
@@ -170,6 +210,13 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
                 Way::Reflect { velocity: velocity.into(), min: min.into(), max: max.into(), spin };
             movers.push((number as u32, way));
         }
+        if let Some(InlineJumps { offsets, period }) = object.jumps {
+            if !offsets.as_flattened().iter().all(|c| c.is_finite()) {
+                return Err(format!("object {number}: its jumps must be finite"));
+            }
+            let offsets = offsets.into_iter().map(DVec3::from).collect();
+            jumpers.push((number as u32, Jumps { offsets, period }));
+        }
     }
     Ok(Scene {
         name: file.name.unwrap_or_else(|| "inline".to_owned()),
@@ -178,8 +225,12 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
         objects,
         camera: camera(&path, chosen.frames)?,
         viewport: chosen.viewport,
+        leaf_triangles: file.leaf_triangles.unwrap_or(chosen.leaf_triangles),
         frames: chosen.frames,
-        effects: Effects { motion: (!movers.is_empty()).then_some(Motion { movers }) },
+        effects: Effects {
+            motion: (!movers.is_empty()).then_some(Motion { movers }),
+            teleport: (!jumpers.is_empty()).then_some(Teleport { jumpers }),
+        },
     })
 }
 
@@ -193,14 +244,36 @@ fn camera(path: &InlinePath, duration: u32) -> Result<CameraPath, String> {
     let poses = poses
         .filter(|poses| !poses.is_empty())
         .ok_or("camera_path: needs poses whose eye and target are finite and differ")?;
-    if !(path.fov_y_degrees > 0.0 && path.fov_y_degrees < 180.0) {
-        return Err("camera_path: fov_y_degrees must be above 0 and below 180".to_owned());
+    let lens = match (path.fov_y_degrees, path.orthographic_height) {
+        (Some(degrees), None) if degrees > 0.0 && degrees < 180.0 => {
+            Lens::Perspective { fov_y: degrees.to_radians(), shift: path.shift }
+        }
+        (Some(_), None) => {
+            return Err("camera_path: fov_y_degrees must be above 0 and below 180".to_owned());
+        }
+        (None, Some(height)) if height > 0.0 && height.is_finite() => Lens::Orthographic { height },
+        (None, Some(_)) => {
+            return Err("camera_path: orthographic_height must be above 0 and finite".to_owned());
+        }
+        _ => {
+            let what = "camera_path: needs one of fov_y_degrees and orthographic_height";
+            return Err(what.to_owned());
+        }
+    };
+    if !path.shift.iter().all(|share| share.is_finite()) {
+        return Err("camera_path: shift must be finite".to_owned());
     }
-    if !(path.near > 0.0 && path.far > path.near && path.far.is_finite()) {
-        return Err("camera_path: needs 0 < near < far".to_owned());
+    let endless = path.far == f64::INFINITY && matches!(lens, Lens::Perspective { .. });
+    if !(path.near > 0.0 && path.far > path.near && (path.far.is_finite() || endless)) {
+        return Err(
+            "camera_path: needs 0 < near < far; with fov_y_degrees far may be inf".to_owned()
+        );
     }
-    let fov_y = path.fov_y_degrees.to_radians();
-    Ok(CameraPath { poses, duration, fov_y, near: path.near, far: path.far })
+    let travel = match path.travel {
+        TravelName::Glide => Travel::Glide,
+        TravelName::Jump => Travel::Jump,
+    };
+    Ok(CameraPath { poses, duration, travel, lens, near: path.near, far: path.far })
 }
 
 #[cfg(test)]
@@ -234,6 +307,14 @@ mod tests {
             ("version = 1\nseed = \n", "line 2"),
             (&INLINE.replace("[0,1,2]", "[0,1,3]"), "names a vertex beyond the 3"),
             (&INLINE.replace("near = 0.1", "near = 0.0"), "needs 0 < near < far"),
+            (&INLINE.replace("fov_y_degrees = 60", "fov_y_degrees = 180"), "below 180"),
+            (&INLINE.replace("fov_y_degrees = 60", ""), "needs one of fov_y_degrees"),
+            (
+                &INLINE
+                    .replace("fov_y_degrees = 60", "orthographic_height = 2")
+                    .replace("= 10\n", "= inf\n"),
+                "needs 0 < near < far",
+            ),
             (&INLINE.replace("target = [0,0,0]", "target = [0,0,5]"), "finite and differ"),
             (&INLINE.replace("[1,0,0]", "[nan,0,0]"), "not finite"),
         ] {

@@ -14,11 +14,14 @@ mod stream;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::{DMat4, DQuat, DVec3};
+use glam::{DMat3, DMat4, DQuat, DVec3};
 pub use plainsight_reference::Viewport;
 
-pub use camera::{Camera, CameraPath, CameraPose};
+pub use camera::{Camera, CameraPath, CameraPose, Lens, Travel};
 pub use stream::Stream;
+
+/// Most triangles in a part by default.
+pub const LEAF_TRIANGLES: u32 = 3072;
 
 /// Triangles over shared positions, in the mesh's own space.
 ///
@@ -73,7 +76,7 @@ impl Mesh {
     }
 }
 
-/// Where an object stands: scale first, then rotation, then translation.
+/// Where an object stands: scale first, then shear, rotation, translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Position of the object's origin in the world.
@@ -82,12 +85,19 @@ pub struct Placement {
     pub rotation: DQuat,
     /// Factors along the object's axes; negative ones mirror.
     pub scale: DVec3,
+    /// How far scaled points lean: x by `shear.x` times y and `shear.y` times z, y by `shear.z` times z.
+    /// What a child of an unevenly scaled and turned parent gets in a scene graph.
+    pub shear: DVec3,
 }
 
 impl Placement {
     /// At the world's origin, unrotated and unscaled.
-    pub const IDENTITY: Self =
-        Self { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
+    pub const IDENTITY: Self = Self {
+        translation: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        scale: DVec3::ONE,
+        shear: DVec3::ZERO,
+    };
 
     /// The placement at `translation`, unrotated and unscaled.
     #[must_use]
@@ -98,7 +108,15 @@ impl Placement {
     /// The affine matrix from the object's space to the world.
     #[must_use]
     pub fn world_from_object(&self) -> DMat4 {
-        DMat4::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
+        let placed =
+            DMat4::from_scale_rotation_translation(self.scale, self.rotation, self.translation);
+        if self.shear == DVec3::ZERO {
+            return placed;
+        }
+        let DVec3 { x, y, z } = self.shear;
+        let shear = DMat3::from_cols(DVec3::X, DVec3::new(x, 1.0, 0.0), DVec3::new(y, z, 1.0));
+        let turned = DMat3::from_quat(self.rotation) * shear * DMat3::from_diagonal(self.scale);
+        DMat4::from_mat3_translation(turned, self.translation)
     }
 }
 
@@ -116,6 +134,24 @@ pub struct Object {
 pub struct Effects {
     /// Objects that move.
     pub motion: Option<Motion>,
+    /// Objects that jump.
+    pub teleport: Option<Teleport>,
+}
+
+/// Which objects jump, and where to.
+#[derive(Clone, Debug, Default)]
+pub struct Teleport {
+    /// (object, jumps), at most one entry an object. An object that moves as well jumps on its way.
+    pub jumpers: Vec<(u32, Jumps)>,
+}
+
+/// Places that an object is at in turn, with nothing between.
+#[derive(Clone, Debug, Default)]
+pub struct Jumps {
+    /// World units, added to where the object would be; without any it stays there.
+    pub offsets: Vec<DVec3>,
+    /// Frames at each; 0 counts as 1.
+    pub period: u32,
 }
 
 /// Which objects move, and how.
@@ -168,6 +204,8 @@ pub struct Scene {
     pub viewport: Viewport,
     /// How many frames a run has by default.
     pub frames: u32,
+    /// Most triangles in a part where the user says nothing; at least 1.
+    pub leaf_triangles: u32,
     /// What moves or changes.
     pub effects: Effects,
 }

@@ -6,7 +6,7 @@ use plainsight::check::Gate;
 use plainsight::cull::{CullerKind, CullerSetup, ProxyKind};
 use plainsight::index::IndexKind;
 use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware};
-use plainsight::oracle::{Always, CostModel, Oracle, Questions, Sim};
+use plainsight::oracle::{Always, CostModel, HierarchicalZ, Oracle, Questions, Sim};
 use plainsight::part::PartitionKnobs;
 use plainsight::run::{Lane, LaneInfo, Repeat, Trace, World, run};
 use plainsight::scene::Viewport;
@@ -15,7 +15,8 @@ use plainsight::scene::generate::{Knobs, build};
 /// Scenes of the shared tests; `model` needs a file.
 pub(crate) const SCENES: [&str; 5] = ["bunnies", "powerplant", "city", "rooms", "soup"];
 /// Oracles of the shared tests.
-pub(crate) const ORACLES: [&str; 5] = ["sim", "hardware", "pyramid", "read-back", "always"];
+pub(crate) const ORACLES: [&str; 6] =
+    ["sim", "hierarchical-z", "hardware", "pyramid", "read-back", "always"];
 
 /// The device, opened once. A test that needs one fails without it.
 pub(crate) fn gpu() -> &'static Arc<Gpu> {
@@ -47,6 +48,7 @@ pub(crate) fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
     let stage = world.stage();
     match name {
         "sim" => Box::new(Sim::new(stage)),
+        "hierarchical-z" => Box::new(HierarchicalZ::new(stage)),
         "always" => Box::<Always>::default(),
         _ => {
             let questions = Questions::of(name).expect("an oracle of that name");
@@ -74,12 +76,8 @@ pub(crate) fn gate(
         })
     };
     let oracle = oracle(oracle_name, world);
-    let info = LaneInfo {
-        culler: culler.name.to_owned(),
-        oracle: oracle.name(),
-        device: oracle.device(),
-        replay: format!("scene {} seed {}", world.scene.name, world.scene.seed),
-    };
+    let replay = format!("scene {} seed {}", world.scene.name, world.scene.seed);
+    let info = LaneInfo::of(culler.name, oracle.as_ref(), replay);
     let mut gate = Gate::default();
     let (culler, observer) = (Box::new(make), &mut gate);
     let lane = Lane { info, culler, oracle, observer, with_bound: false };

@@ -6,14 +6,14 @@ use plainsight::math::{
     Aabb, CLIP_ERROR_GAMMA, ClipBox, ClipError, DEPTH_ROUNDING, Projection,
     RECTANGLE_DILATION_PIXELS, inflated_box, rounded_clip_matrix,
 };
-use plainsight::scene::{Camera, Stream, Viewport};
+use plainsight::scene::{Camera, Lens, Stream, Viewport};
 use plainsight_reference::{Draw, Faces, Image, naive};
 
 const VIEWPORT: Viewport = Viewport { width: 201, height: 133 };
 
 fn camera(near: f64, far: f64) -> DMat4 {
     let (eye, forward) = (DVec3::ZERO, DVec3::NEG_Z);
-    Camera { eye, forward, fov_y: 1.0, near, far }.clip_from_world(VIEWPORT)
+    Camera { eye, forward, lens: Lens::perspective(1.0), near, far }.clip_from_world(VIEWPORT)
 }
 
 /// Clip coordinates (x, y, z, w) = (x, y, z, 1): boxes can be put where a test wants them.

@@ -3,6 +3,8 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use plainsight_reference::Tolerance;
+
 use super::images::Images;
 use super::pyramid::{Ask, Pyramid};
 use super::read_back::{DepthReader, MOST_COPIES};
@@ -485,6 +487,10 @@ fn rectangle(viewport: Viewport, min: [u32; 2], max: [u32; 2], depth: f32) -> [[
 impl Oracle for Hardware {
     fn name(&self) -> &'static str {
         self.questions.name()
+    }
+
+    fn tolerance(&self) -> Tolerance {
+        self.stage.gpu.tolerance()
     }
 
     fn device(&self) -> Option<String> {

@@ -10,8 +10,8 @@ use glam::{DQuat, DVec3};
 
 use super::Chosen;
 use crate::scene::{
-    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path, Placement, Scene, SceneError,
-    Stream, import,
+    CameraPath, CameraPose, Effects, Lens, Mesh, Motion, Object, Path, Placement, Scene,
+    SceneError, Stream, Travel, import,
 };
 
 /// Blobs at scale 1.
@@ -52,6 +52,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
             translation: point(&mut place, side),
             rotation: DQuat::from_rotation_y(place.range(0.0, std::f64::consts::TAU)),
             scale: DVec3::splat(place.range(0.8, 1.2)),
+            ..Placement::IDENTITY
         };
         objects.push(Object { mesh: place.below(meshes.len() as u32), placement });
         let velocity = point(&mut motion, 0.08);
@@ -76,13 +77,15 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         camera: CameraPath {
             poses,
             duration: chosen.frames,
-            fov_y: 1.0,
+            travel: Travel::Glide,
+            lens: Lens::perspective(1.0),
             near: 0.1,
             far: 8.0 * side + 20.0,
         },
         viewport: chosen.viewport,
+        leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
-        effects: Effects { motion: Some(Motion { movers }) },
+        effects: Effects { motion: Some(Motion { movers }), ..Effects::default() },
     })
 }
 
@@ -97,7 +100,7 @@ fn meshes(chosen: &Chosen) -> Result<(Vec<Arc<Mesh>>, u32), SceneError> {
         let shape = |i| Arc::new(super::blob(triangles, chosen.seed.wrapping_mul(SHAPES) ^ i));
         return Ok(((0..SHAPES).map(shape).collect(), count));
     };
-    let whole = import::merged(&import::obj(path)?, 1.0)?;
+    let whole = import::merged(&import::model(path)?, 1.0)?;
     let count = if chosen.full_size {
         FULL_COUNT
     } else {

@@ -8,8 +8,8 @@ use glam::DVec3;
 use super::Chosen;
 use super::shape::Builder;
 use crate::scene::{
-    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path, Placement, Scene, SceneError,
-    Stream,
+    CameraPath, CameraPose, Effects, Lens, Mesh, Motion, Object, Path, Placement, Scene,
+    SceneError, Stream, Travel,
 };
 
 /// Blocks along a side at scale 1.
@@ -64,8 +64,9 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         objects,
         camera: drive(chosen, blocks),
         viewport: chosen.viewport,
+        leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
-        effects: Effects { motion: Some(Motion { movers }) },
+        effects: Effects { motion: Some(Motion { movers }), ..Effects::default() },
     })
 }
 
@@ -81,7 +82,14 @@ fn drive(chosen: &Chosen, blocks: u32) -> CameraPath {
         pose(at(street, street), at(street + PITCH, street + PITCH)),
         pose(at(street, street + PITCH * 0.5), at(street + 1.0, side + PITCH)),
     ];
-    CameraPath { poses, duration: chosen.frames, fov_y: 1.0, near: 0.1, far: side * 2.0 + 100.0 }
+    CameraPath {
+        poses,
+        duration: chosen.frames,
+        travel: Travel::Glide,
+        lens: Lens::perspective(1.0),
+        near: 0.1,
+        far: side * 2.0 + 100.0,
+    }
 }
 
 /// A tower on the unit lot, 8 to 24 units high, with ledges, windows set in, and a stepped top.

@@ -2,6 +2,7 @@
 
 mod bunnies;
 mod city;
+mod hard;
 mod model;
 mod plant_parts;
 mod powerplant;
@@ -11,8 +12,9 @@ mod soup;
 
 use std::path::PathBuf;
 
-use super::{Scene, SceneError, Viewport, file};
+use super::{LEAF_TRIANGLES, Scene, SceneError, Viewport, file};
 
+pub use hard::HARD;
 pub use shape::blob;
 
 /// What a user may choose; `None` leaves it to the generator or the scene file.
@@ -22,9 +24,9 @@ pub struct Knobs {
     pub seed: Option<u64>,
     /// Size of the scene, 1 by default; see each generator for what grows. In (0, 1000].
     pub scale: Option<f64>,
-    /// Frames of a run, at least 1; 24 by default.
+    /// Frames of a run, at least 1; 24 by default, in most scenes.
     pub frames: Option<u32>,
-    /// Pixels; 1280 × 1024 by default.
+    /// Pixels; 1280 × 1024 by default, in most scenes.
     pub viewport: Option<Viewport>,
     /// A model in the place of the generated shape.
     pub mesh: Option<PathBuf>,
@@ -49,23 +51,25 @@ pub(super) struct Chosen {
     pub(super) scale: f64,
     pub(super) frames: u32,
     pub(super) viewport: Viewport,
+    pub(super) leaf_triangles: u32,
     pub(super) mesh: Option<PathBuf>,
     pub(super) camera: CameraMode,
     pub(super) full_size: bool,
 }
 
 impl Knobs {
-    pub(super) fn chosen(&self) -> Result<Chosen, SceneError> {
+    /// With the defaults of `generator` in the place of what is left open.
+    pub(super) fn chosen(&self, generator: &Generator) -> Result<Chosen, SceneError> {
         let refuse = |knob, range, got: String| Err(SceneError::Knob { knob, range, got });
         let scale = self.scale.unwrap_or(1.0);
         if !(scale > 0.0 && scale <= 1000.0) {
             return refuse("--scale", "above 0 and at most 1000", scale.to_string());
         }
-        let frames = self.frames.unwrap_or(24);
+        let frames = self.frames.unwrap_or(generator.frames);
         if !(1..=1_000_000).contains(&frames) {
             return refuse("--frames", "from 1 to 1000000", frames.to_string());
         }
-        let viewport = self.viewport.unwrap_or(Viewport { width: 1280, height: 1024 });
+        let viewport = self.viewport.unwrap_or(generator.viewport);
         let legal = 1..=Viewport::MAX_SIDE;
         if !(legal.contains(&viewport.width) && legal.contains(&viewport.height)) {
             let got = format!("{}x{}", viewport.width, viewport.height);
@@ -76,6 +80,7 @@ impl Knobs {
             scale,
             frames,
             viewport,
+            leaf_triangles: generator.leaf_triangles,
             mesh: self.mesh.clone(),
             camera: self.camera.unwrap_or(CameraMode::Orbit),
             full_size: self.full_size,
@@ -92,46 +97,65 @@ pub struct Generator {
     pub summary: &'static str,
     /// Frames of a run at the size its source gives; `None` for a scene without such a size.
     pub full_size_frames: Option<u32>,
+    /// Pixels where none are asked for.
+    pub viewport: Viewport,
+    /// Frames of a run where none are asked for.
+    pub frames: u32,
+    /// Most triangles in a part where no number is asked for.
+    pub leaf_triangles: u32,
     build: fn(&Chosen) -> Result<Scene, SceneError>,
 }
 
-/// Every generator there is.
+/// What most generators have in common; also the defaults of an inline scene file.
+pub(super) const USUAL: Generator = Generator {
+    name: "",
+    summary: "",
+    full_size_frames: None,
+    viewport: Viewport { width: 1280, height: 1024 },
+    frames: 24,
+    leaf_triangles: LEAF_TRIANGLES,
+    build: |_| unreachable!("nothing is called like it"),
+};
+
+/// The generators of large scenes; the hard ones are in [`HARD`].
 pub const GENERATORS: &[Generator] = &[
     Generator {
         name: "bunnies",
         summary: "moving bumpy blobs packed densely in a box, freely interpenetrating",
         full_size_frames: Some(100),
         build: bunnies::build,
+        ..USUAL
     },
     Generator {
         name: "powerplant",
         summary: "bays of a plant with boilers, pipes, gratings and walls; the camera flies through",
         full_size_frames: Some(250),
         build: powerplant::build,
+        ..USUAL
     },
     Generator {
         name: "city",
         summary: "blocks and streets with moving cars, the camera at street level",
-        full_size_frames: None,
         build: city::build,
+        ..USUAL
     },
     Generator {
         name: "rooms",
         summary: "a floor of furnished rooms with doorways, the camera walking through",
-        full_size_frames: None,
         build: rooms::build,
+        ..USUAL
     },
     Generator {
         name: "soup",
         summary: "random triangles and boxes of wild sizes, for property tests",
-        full_size_frames: None,
         build: soup::build,
+        ..USUAL
     },
     Generator {
         name: "model",
-        summary: "an imported OBJ model (--mesh), each of its groups an object",
-        full_size_frames: None,
+        summary: "an imported model (--mesh; OBJ, glTF, PLY), each of its groups an object",
         build: model::build,
+        ..USUAL
     },
 ];
 
@@ -141,11 +165,12 @@ pub const GENERATORS: &[Generator] = &[
 /// [`SceneError::Unknown`] for a name that is not in [`GENERATORS`], [`SceneError::Knob`] for a knob
 /// out of range, and what the import says where a model is asked for.
 pub fn build(name: &str, knobs: &Knobs) -> Result<Scene, SceneError> {
-    let Some(generator) = GENERATORS.iter().find(|g| g.name == name) else {
+    let Some(generator) = GENERATORS.iter().chain(HARD).find(|g| g.name == name) else {
         let names: Vec<&str> = GENERATORS.iter().map(|g| g.name).collect();
-        return Err(SceneError::Unknown { name: name.to_owned(), known: names.join(", ") });
+        let known = format!("{} and hard/…", names.join(", "));
+        return Err(SceneError::Unknown { name: name.to_owned(), known });
     };
-    let mut chosen = knobs.chosen()?;
+    let mut chosen = knobs.chosen(generator)?;
     if knobs.full_size {
         let refuse = |range, got: String| Err(SceneError::Knob { knob: "--full-size", range, got });
         let Some(frames) = generator.full_size_frames else {
@@ -157,6 +182,25 @@ pub fn build(name: &str, knobs: &Knobs) -> Result<Scene, SceneError> {
         chosen.frames = knobs.frames.unwrap_or(frames);
     }
     (generator.build)(&chosen)
+}
+
+/// The scenes that a name with `*` in the place of any letters stands for, in the order of the lists;
+/// one without stands for itself.
+///
+/// # Errors
+/// [`SceneError::Unknown`] where nothing matches.
+pub fn matching(pattern: &str) -> Result<Vec<String>, SceneError> {
+    let Some((head, tail)) = pattern.split_once('*') else { return Ok(vec![pattern.to_owned()]) };
+    let matches = |name: &str| {
+        name.len() >= head.len() + tail.len() && name.starts_with(head) && name.ends_with(tail)
+    };
+    let names = GENERATORS.iter().chain(HARD).map(|g| g.name);
+    let found: Vec<String> = names.filter(|name| matches(name)).map(str::to_owned).collect();
+    if found.is_empty() {
+        let known = "see `plainsight list`".to_owned();
+        return Err(SceneError::Unknown { name: pattern.to_owned(), known });
+    }
+    Ok(found)
 }
 
 /// A generator's scene or, for a name that ends in `.toml`, that file's; knobs given here win over
@@ -230,5 +274,13 @@ mod tests {
         assert!(matches!(build("powerplant", &both), Err(SceneError::Knob { .. })));
         assert!(matches!(build("nowhere", &Knobs::default()), Err(SceneError::Unknown { .. })));
         assert!(matches!(build("model", &Knobs::default()), Err(SceneError::Knob { .. })));
+    }
+
+    #[test]
+    fn stars_stand_for_letters() {
+        assert_eq!(matching("hard/*").unwrap().len(), HARD.len());
+        assert_eq!(matching("*ounds").map_err(|e| e.to_string()).unwrap_err().lines().count(), 1);
+        assert_eq!(matching("b*s").unwrap(), ["bunnies"]);
+        assert_eq!(matching("no star").unwrap(), ["no star"]);
     }
 }

@@ -8,17 +8,19 @@ use glam::DVec3;
 
 use super::{CameraMode, Chosen};
 use crate::math::{Aabb, cos, sin};
-use crate::scene::{CameraPath, CameraPose, Effects, Object, Placement, Scene, SceneError, import};
+use crate::scene::{
+    CameraPath, CameraPose, Effects, Lens, Object, Placement, Scene, SceneError, Travel, import,
+};
 
 /// Poses of the camera round a model.
 const POSES: u32 = 16;
 
 pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
     let Some(path) = &chosen.mesh else {
-        let (knob, range) = ("--mesh", "an OBJ file for the scene 'model'");
+        let (knob, range) = ("--mesh", "a model file for the scene 'model'");
         return Err(SceneError::Knob { knob, range, got: "none".to_owned() });
     };
-    let meshes = import::obj(path)?;
+    let meshes = import::model(path)?;
     let bounds = Aabb::of_points(meshes.iter().flat_map(|mesh| mesh.positions()));
     let copies = chosen.scale.round().max(1.0) as u32;
     let step = DVec3::X * bounds.size().x * 1.1;
@@ -35,6 +37,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         objects,
         camera: camera(chosen, &bounds),
         viewport: chosen.viewport,
+        leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
         effects: Effects::default(),
     })
@@ -63,5 +66,12 @@ fn camera(chosen: &Chosen, bounds: &Aabb) -> CameraPath {
     };
     let (near, far) = (radius * 1e-3, radius * 6.0);
     let poses = (0..=POSES).map(pose).collect();
-    CameraPath { poses, duration: chosen.frames, fov_y: 1.0, near, far }
+    CameraPath {
+        poses,
+        duration: chosen.frames,
+        travel: Travel::Glide,
+        lens: Lens::perspective(1.0),
+        near,
+        far,
+    }
 }

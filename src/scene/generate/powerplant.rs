@@ -15,7 +15,8 @@ use glam::{DQuat, DVec3};
 use super::Chosen;
 use super::plant_parts as parts;
 use crate::scene::{
-    CameraPath, CameraPose, Effects, Mesh, Object, Placement, Scene, SceneError, Stream,
+    CameraPath, CameraPose, Effects, Lens, Mesh, Object, Placement, Scene, SceneError, Stream,
+    Travel,
 };
 
 /// Bays at scale 1, and at full size: 15 × 79 = 1,185 objects.
@@ -170,6 +171,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         objects: plant.objects,
         camera: fly_through(row, bays.div_ceil(row), chosen.frames),
         viewport: chosen.viewport,
+        leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
         effects: Effects::default(),
     })
@@ -197,5 +199,12 @@ fn fly_through(bays_x: u32, bays_z: u32, frames: u32) -> CameraPath {
         pose([x + 30.0, 25.0, door + 10.0], [0.8 * x, 10.0, z + 60.0]),
         pose([x + 40.0, 50.0, z + 40.0], [0.5 * x, 10.0, 0.5 * z]),
     ];
-    CameraPath { poses, duration: frames, fov_y: 1.0, near: 0.1, far: 3.0 * (x + z) + 300.0 }
+    CameraPath {
+        poses,
+        duration: frames,
+        travel: Travel::Glide,
+        lens: Lens::perspective(1.0),
+        near: 0.1,
+        far: 3.0 * (x + z) + 300.0,
+    }
 }

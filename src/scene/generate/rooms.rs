@@ -8,8 +8,8 @@ use glam::{DQuat, DVec3};
 use super::Chosen;
 use super::shape::Builder;
 use crate::scene::{
-    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path, Placement, Scene, SceneError,
-    Stream,
+    CameraPath, CameraPose, Effects, Lens, Mesh, Motion, Object, Path, Placement, Scene,
+    SceneError, Stream, Travel,
 };
 
 /// Rooms along a side at scale 1.
@@ -41,7 +41,10 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
     let (mut objects, mut movers) = (Vec::new(), Vec::new());
     let quarter = DQuat::from_rotation_y(-std::f64::consts::FRAC_PI_2);
     let mut put = |mesh: u32, translation: DVec3, rotation: DQuat, scale: DVec3| {
-        objects.push(Object { mesh, placement: Placement { translation, rotation, scale } });
+        objects.push(Object {
+            mesh,
+            placement: Placement { translation, rotation, scale, ..Placement::IDENTITY },
+        });
         objects.len() as u32 - 1
     };
     for i in 0..=rooms {
@@ -85,8 +88,9 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         objects,
         camera: walk(chosen, rooms),
         viewport: chosen.viewport,
+        leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
-        effects: Effects { motion: Some(Motion { movers }) },
+        effects: Effects { motion: Some(Motion { movers }), ..Effects::default() },
     })
 }
 
@@ -102,7 +106,14 @@ fn walk(chosen: &Chosen, rooms: u32) -> CameraPath {
         pose(at(middle, middle), at(middle + SIDE, far)),
         pose(at(middle, middle + SIDE * 0.9), at(middle - SIDE * 0.2, far + SIDE)),
     ];
-    CameraPath { poses, duration: chosen.frames, fov_y: 1.2, near: 0.05, far: far * 2.0 + 10.0 }
+    CameraPath {
+        poses,
+        duration: chosen.frames,
+        travel: Travel::Glide,
+        lens: Lens::perspective(1.2),
+        near: 0.05,
+        far: far * 2.0 + 10.0,
+    }
 }
 
 fn floor() -> Mesh {

@@ -8,8 +8,8 @@ use glam::{DQuat, DVec3};
 use super::Chosen;
 use super::shape::Builder;
 use crate::scene::{
-    CameraPath, CameraPose, Effects, Mesh, Motion, Object, Path, Placement, Scene, SceneError,
-    Stream,
+    CameraPath, CameraPose, Effects, Lens, Mesh, Motion, Object, Path, Placement, Scene,
+    SceneError, Stream, Travel,
 };
 
 /// Objects at scale 1.
@@ -43,7 +43,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         }
         objects.push(Object {
             mesh: place.below(designs),
-            placement: Placement { translation, rotation, scale },
+            placement: Placement { translation, rotation, scale, ..Placement::IDENTITY },
         });
         if motion.below(2) == 0 {
             let velocity = within(&mut motion, 0.5);
@@ -67,13 +67,15 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         camera: CameraPath {
             poses,
             duration: chosen.frames,
-            fov_y: 1.1,
+            travel: Travel::Glide,
+            lens: Lens::perspective(1.1),
             near: 0.05,
             far: SPACE * 8.0,
         },
         viewport: chosen.viewport,
+        leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
-        effects: Effects { motion: Some(Motion { movers }) },
+        effects: Effects { motion: Some(Motion { movers }), ..Effects::default() },
     })
 }
 

@@ -4,25 +4,18 @@
 
 use std::path::Path;
 
-use super::{Mesh, SceneError};
-use crate::math::Aabb;
+use super::short;
+use crate::scene::Mesh;
 
-/// Reads the meshes of `path`, in file order; groups without faces are left out.
-///
-/// # Errors
-/// [`SceneError::Read`] where the file cannot be read, [`SceneError::File`] with the line where a
-/// number is no finite f32, a face names a vertex that is not there, or nothing is left to draw.
-pub fn obj(path: &Path) -> Result<Vec<Mesh>, SceneError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
-    let refuse = |what: String| SceneError::File { path: path.to_owned(), what };
-    let text = String::from_utf8_lossy(&bytes);
-    scan(&text).map_err(refuse)?;
+/// Groups without faces are left out.
+pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Mesh>, String> {
+    let text = String::from_utf8_lossy(bytes);
+    scan(&text)?;
     let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
     // Materials are never wanted; tobj reports their absence beside the models.
     let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials)
-        .map_err(|error| refuse(format!("not an OBJ file that can be read: {error}")))?;
+        .map_err(|error| format!("not an OBJ file that can be read: {error}"))?;
     let mut meshes = Vec::new();
     for model in models {
         let triple = |c: &[f32]| [c[0], c[1], c[2]];
@@ -31,11 +24,8 @@ pub fn obj(path: &Path) -> Result<Vec<Mesh>, SceneError> {
             model.mesh.indices.chunks_exact(3).map(|i| [i[0], i[1], i[2]]).collect();
         if !triangles.is_empty() {
             let mesh = Mesh::new(model.name, positions, triangles);
-            meshes.push(mesh.map_err(|error| refuse(error.to_string()))?);
+            meshes.push(mesh.map_err(|error| error.to_string())?);
         }
-    }
-    if meshes.is_empty() {
-        return Err(refuse("holds no faces; export the model with its polygons".to_owned()));
     }
     Ok(meshes)
 }
@@ -84,44 +74,12 @@ fn scan(text: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Enough of a word to know it by.
-fn short(word: &str) -> String {
-    word.chars().take(24).collect()
-}
-
-/// All meshes as one, its box centred at the origin and scaled so that the farthest corner of the box
-/// is `radius` away.
-///
-/// # Errors
-/// [`SceneError::Mesh`] where there are more vertices than an index can name.
-pub fn merged(meshes: &[Mesh], radius: f64) -> Result<Mesh, SceneError> {
-    let bounds = Aabb::of_points(meshes.iter().flat_map(|mesh| mesh.positions()));
-    let half = bounds.size().length() * 0.5;
-    let factor = if half > 0.0 { radius / half } else { 1.0 };
-    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
-    for mesh in meshes {
-        let first = u32::try_from(positions.len()).map_err(|_| SceneError::Mesh {
-            mesh: mesh.name().to_owned(),
-            what: "has more than 2³² vertices with those before it".to_owned(),
-        })?;
-        let moved = |p: &[f32; 3]| {
-            let p = glam::DVec3::from_array(p.map(f64::from));
-            ((p - bounds.center()) * factor).as_vec3().to_array()
-        };
-        positions.extend(mesh.positions().iter().map(moved));
-        triangles.extend(mesh.triangles().iter().map(|t| t.map(|i| first + i)));
-    }
-    Mesh::new("merged", positions, triangles)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn import(text: &str) -> Result<Vec<Mesh>, String> {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), text).unwrap();
-        obj(file.path()).map_err(|error| error.to_string())
+        crate::scene::import::parse(crate::scene::import::Format::Obj, text.as_bytes(), None)
     }
 
     #[test]

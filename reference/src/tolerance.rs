@@ -1,0 +1,297 @@
+//! Three-valued truth: what must be visible, what may be, and what is hidden, on a device that need not
+//! rasterize as the reference does. Vulkan allows vertices to be snapped to as few as 1/16 pixel and
+//! leaves the interpolation of depth inexact; a [`Tolerance`] says how far a device may stand from the
+//! raster rules of this crate.
+//!
+//! At each sample a triangle is *dilated* (it may cover the sample) where the sample is within ε of it,
+//! and *eroded* (it surely covers it) where the sample is farther than ε inside all of its edges. Its
+//! depth there is within δ = (|∂z/∂x| + |∂z/∂y|)·ε, clamped to the triangle's range, and k ulps. Then a
+//! part
+//! - **must** be visible if at some sample one of its eroded triangles is, at its farthest, strictly
+//!   nearer than every dilated triangle of every other part at its nearest;
+//! - is **hidden** if at no sample any of its dilated triangles at its nearest reaches the farthest depth
+//!   of the nearest eroded triangle;
+//! - **may** be visible otherwise.
+//!
+//! # Why it is sound
+//! A device within the tolerance draws, at a sample, every eroded triangle and no triangle that is not
+//! dilated, each at a depth within its bounds. So at a sample that decides for *must* the device's
+//! nearest triangle is of that part, and a *hidden* part is strictly behind something everywhere. Both
+//! sets only shrink as ε and k grow, because eroded triangles, then, are fewer, dilated ones more, and
+//! depths farther apart: widening moves parts into *may* and nowhere else.
+//!
+//! # At tolerance zero
+//! Eroded and dilated are the exact coverage, depths the exact ones: *must* is what the image shows at a
+//! sample without a tie, *may* is what only ties decide.
+//!
+//! One plain loop, as in [`crate::naive`]: it is asked only where a device misses what the exact truth
+//! shows.
+
+use crate::draw::Draw;
+use crate::image::Viewport;
+use crate::window::{Oriented, SUBPIXELS, Window, WindowVertex, depth, edge, top_left};
+
+/// How far a device's image may stand from the raster rules.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tolerance {
+    /// ε: how far edges may be displaced, pixels, ≥ 0. Also what depth may be off along its slope.
+    pub pixels: f64,
+    /// How many f32 depths a fragment may be off beyond that.
+    pub ulps: u32,
+    /// The same for triangles that clipping cuts, where a device makes vertices of its own.
+    pub clipped_ulps: u32,
+}
+
+impl Tolerance {
+    /// None: the raster rules to the bit.
+    pub const EXACT: Self = Self { pixels: 0.0, ulps: 0, clipped_ulps: 0 };
+}
+
+/// What a device within the tolerance may make of a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Fate {
+    /// It shows, at some sample at least.
+    Must,
+    /// It may show.
+    May,
+    /// It does not show.
+    Hidden,
+}
+
+/// What a device within the tolerance may make of a frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fates {
+    /// By part, in the order in which they were given.
+    pub parts: Vec<Fate>,
+    /// By sample (row × width + column): the part, if any, that it must show.
+    pub decided: Vec<Option<u32>>,
+}
+
+/// Bits of depth 1: what a cleared sample has.
+const FARTHEST: u32 = 1.0_f32.to_bits();
+/// No part.
+const NOBODY: u32 = u32::MAX;
+/// Lengths of edges are rounded once, and products with ε once more: four units of 2⁻⁵³ are more than
+/// both, so that no eroded sample is taken for surer, and no dilated one for less likely, than it is.
+const LENGTH_SLACK: f64 = 4.0 * f64::EPSILON;
+
+/// The nearest that dilated triangles can be at a sample, of two different parts.
+#[derive(Clone, Copy)]
+struct Rivals {
+    first: u32,
+    part: u32,
+    /// The nearest of any part but `part`.
+    second: u32,
+}
+
+impl Rivals {
+    fn meet(&mut self, part: u32, near: u32) {
+        if part == self.part {
+            self.first = self.first.min(near);
+        } else if near < self.first {
+            *self = Self { first: near, part, second: self.first };
+        } else {
+            self.second = self.second.min(near);
+        }
+    }
+
+    /// The nearest of the others.
+    fn of(&self, part: u32) -> u32 {
+        if part == self.part { self.second } else { self.first }
+    }
+}
+
+/// A triangle at a sample: bits of the depths between which it is there.
+struct Fragment {
+    sample: usize,
+    near: u32,
+    far: u32,
+    eroded: bool,
+}
+
+/// The fates of `parts`, each of which is one draw. Takes 32 bytes a sample.
+///
+/// # Panics
+/// For 2³² − 1 parts or more, and where ranks and triangles of a draw are not as many.
+#[must_use]
+pub fn fates(viewport: Viewport, parts: &[Draw<'_>], tolerance: Tolerance) -> Fates {
+    assert!(parts.len() < NOBODY as usize, "{} parts", parts.len());
+    let samples = viewport.width as usize * viewport.height as usize;
+    let mut nearest = vec![FARTHEST; samples];
+    let nobody = Rivals { first: FARTHEST, part: NOBODY, second: FARTHEST };
+    let mut rivals = vec![nobody; samples];
+    for (part, draw) in (0..).zip(parts) {
+        fragments(viewport, draw, tolerance, &mut |Fragment { sample, near, far, eroded }| {
+            rivals[sample].meet(part, near);
+            if eroded {
+                nearest[sample] = nearest[sample].min(far);
+            }
+        });
+    }
+    let mut decided = vec![None; samples];
+    let fate = |(part, draw): (u32, &Draw<'_>)| {
+        let (mut must, mut reaches) = (false, false);
+        fragments(viewport, draw, tolerance, &mut |Fragment { sample, near, far, eroded }| {
+            // Depth 1 loses against a cleared sample.
+            reaches |= near < FARTHEST && near <= nearest[sample];
+            if eroded && far < rivals[sample].of(part) {
+                must = true;
+                decided[sample] = Some(part);
+            }
+        });
+        match (must, reaches) {
+            (true, _) => Fate::Must,
+            (false, true) => Fate::May,
+            (false, false) => Fate::Hidden,
+        }
+    };
+    let parts = (0..).zip(parts).map(fate).collect();
+    Fates { parts, decided }
+}
+
+/// Every sample at which a triangle of `draw` may be.
+fn fragments(
+    viewport: Viewport,
+    draw: &Draw<'_>,
+    tolerance: Tolerance,
+    emit: &mut dyn FnMut(Fragment),
+) {
+    assert_eq!(draw.triangles.len(), draw.ranks.len(), "one rank a triangle");
+    let window = Window::new(viewport);
+    for triangle in draw.triangles {
+        let corners = triangle.map(|vertex| draw.clip_vertex(vertex));
+        let Some(polygon) = window.clipper.clip(corners) else { continue };
+        let clipped = corners.iter().any(|&corner| window.clipper.outside(corner) != 0);
+        let ulps = if clipped { tolerance.clipped_ulps } else { tolerance.ulps };
+        let here = Allowed { viewport, pixels: tolerance.pixels, ulps };
+        let vertices: Vec<WindowVertex> =
+            polygon.corners().iter().map(|&corner| window.vertex(corner)).collect();
+        for pair in vertices[1..].windows(2) {
+            let v = [vertices[0], pair[0], pair[1]];
+            let area = edge(v[0], v[1], i64::from(v[2].x), i64::from(v[2].y));
+            match Oriented::new(v, draw.faces) {
+                Some(triangle) => here.triangle(&triangle, emit),
+                // Without area on the reference's grid, perhaps not on the device's.
+                None if area == 0 && tolerance.pixels > 0.0 => here.line(v, emit),
+                None => {}
+            }
+        }
+    }
+}
+
+/// What is allowed of one triangle.
+struct Allowed {
+    viewport: Viewport,
+    pixels: f64,
+    ulps: u32,
+}
+
+impl Allowed {
+    /// ε in sub-pixels.
+    fn reach(&self) -> f64 {
+        self.pixels * SUBPIXELS as f64
+    }
+
+    /// Samples within ε of the box of `v`, as columns and rows with their middles in sub-pixels.
+    fn samples(&self, v: &[WindowVertex; 3]) -> impl Iterator<Item = (usize, [i64; 2])> + use<> {
+        let Viewport { width, height } = self.viewport;
+        let reach = self.reach().ceil() as i64;
+        let range = |at: [i32; 3], side: u32| {
+            let low = i64::from(at.into_iter().min().unwrap_or(0)) - reach;
+            let high = i64::from(at.into_iter().max().unwrap_or(0)) + reach;
+            let middle = SUBPIXELS / 2;
+            // The first sample at or beyond `low`, and the last at or before `high`.
+            let first = (low - middle).div_euclid(SUBPIXELS)
+                + i64::from((low - middle).rem_euclid(SUBPIXELS) > 0);
+            let last = (high - middle).div_euclid(SUBPIXELS);
+            first.max(0)..(last + 1).min(i64::from(side))
+        };
+        let (columns, rows) = (range(v.map(|v| v.x), width), range(v.map(|v| v.y), height));
+        rows.flat_map(move |row| columns.clone().map(move |column| (column, row))).map(
+            move |(column, row)| {
+                let sample = row as usize * width as usize + column as usize;
+                (sample, [column, row].map(|at| at * SUBPIXELS + SUBPIXELS / 2))
+            },
+        )
+    }
+
+    /// Depths between which the triangle is where the reference has `depth`.
+    fn depths(&self, depth: f64, slope: f64, [low, high]: [f32; 2]) -> [u32; 2] {
+        let delta = slope * self.pixels;
+        let within = |depth: f64| (depth.clamp(f64::from(low), f64::from(high)) as f32).to_bits();
+        [
+            within(depth - delta).saturating_sub(self.ulps),
+            (within(depth + delta) + self.ulps).min(FARTHEST),
+        ]
+    }
+
+    fn triangle(&self, triangle: &Oriented, emit: &mut dyn FnMut(Fragment)) {
+        let Oriented { v, area } = *triangle;
+        let opposite = |i: usize| (v[(i + 1) % 3], v[(i + 2) % 3]);
+        let difference = |i: usize| {
+            let (a, b) = opposite(i);
+            [f64::from(b.x) - f64::from(a.x), f64::from(b.y) - f64::from(a.y)]
+        };
+        let z = v.map(|v| v.z);
+        let range = [z.into_iter().fold(1.0, f32::min), z.into_iter().fold(0.0, f32::max)];
+        // Edge value i falls by its Δy and grows by its Δx a sub-pixel.
+        let along = |axis: usize| {
+            let sum: f64 = (0..3).map(|i| difference(i)[axis] * f64::from(z[i])).sum();
+            (sum / area as f64 * SUBPIXELS as f64).abs()
+        };
+        let slope = along(0) + along(1);
+        let exact = self.pixels == 0.0;
+        let bound = [0, 1, 2].map(|i| {
+            let [x, y] = difference(i);
+            self.reach() * (x * x + y * y).sqrt()
+        });
+        for (sample, [x, y]) in self.samples(&v) {
+            let e = [0, 1, 2].map(|i| edge(opposite(i).0, opposite(i).1, x, y));
+            let covers =
+                |i: usize| e[i] > 0 || (e[i] == 0 && top_left(opposite(i).0, opposite(i).1));
+            let within = |i: usize| e[i] as f64 >= -bound[i] * (1.0 + LENGTH_SLACK);
+            let surely = |i: usize| e[i] as f64 > bound[i] * (1.0 + LENGTH_SLACK);
+            if !(0..3).all(if exact { &covers as &dyn Fn(usize) -> bool } else { &within }) {
+                continue;
+            }
+            let at = e.map(|e| e as f64);
+            let (near, far) = if exact {
+                let bits = depth(at, z, area).to_bits();
+                (bits.saturating_sub(self.ulps), (bits + self.ulps).min(FARTHEST))
+            } else {
+                let plane = ((at[0] * f64::from(z[0]) + at[1] * f64::from(z[1]))
+                    + at[2] * f64::from(z[2]))
+                    / area as f64;
+                self.depths(plane, slope, range).into()
+            };
+            emit(Fragment { sample, near, far, eroded: exact || (0..3).all(surely) });
+        }
+    }
+
+    /// A triangle without area: it may cover what is within ε of its sides, at any of its depths.
+    fn line(&self, v: [WindowVertex; 3], emit: &mut dyn FnMut(Fragment)) {
+        let z = v.map(|v| v.z);
+        let low = z.into_iter().fold(1.0, f32::min).to_bits().saturating_sub(self.ulps);
+        let high = z.into_iter().fold(0.0, f32::max).to_bits();
+        let far = (high + self.ulps).min(FARTHEST);
+        for (sample, at) in self.samples(&v) {
+            let near_side = |i: usize| {
+                distance(v[i], v[(i + 1) % 3], at) <= self.reach() * (1.0 + LENGTH_SLACK)
+            };
+            if (0..3).any(near_side) {
+                emit(Fragment { sample, near: low, far, eroded: false });
+            }
+        }
+    }
+}
+
+/// From a point to a segment, sub-pixels; a few f64 roundings.
+fn distance(a: WindowVertex, b: WindowVertex, [x, y]: [i64; 2]) -> f64 {
+    let (ax, ay) = (f64::from(a.x), f64::from(a.y));
+    let (dx, dy) = (f64::from(b.x) - ax, f64::from(b.y) - ay);
+    let (px, py) = (x as f64 - ax, y as f64 - ay);
+    let length = dx * dx + dy * dy;
+    let along = if length > 0.0 { ((px * dx + py * dy) / length).clamp(0.0, 1.0) } else { 0.0 };
+    let (x, y) = (px - along * dx, py - along * dy);
+    (x * x + y * y).sqrt()
+}

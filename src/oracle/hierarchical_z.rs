@@ -1,0 +1,209 @@
+//! Hierarchical z as engines build it (Greene, Kass & Miller 1993, *Hierarchical Z-buffer visibility*;
+//! two-pass occlusion culling on the GPU since): a pyramid whose every level halves the one below and
+//! keeps the farthest depth, and one look at a handful of texels for each rectangle, at the level where
+//! it meets at most 2 × 2 of them. So it errs towards "visible": texels reach beyond the rectangle.
+//!
+//! 1. Level k + 1 has ⌈w / 2⌉ × ⌈h / 2⌉ texels; each is the maximum of the up to 2 × 2 texels below it.
+//!    Rounding up keeps the last column and row of an odd level.
+//! 2. A rectangle of samples `min` to `max − 1` meets the texels `min >> k` to `(max − 1) >> k`. The level
+//!    is the lowest at which that is at most two along each axis.
+//! 3. Visible if any of them is at or beyond the rectangle's depth.
+//!
+//! Its depth is the reference's, so what it may add to `sim` is only "visible". It loses where rectangles
+//! are large or straddle texels. A box is no rectangle: it counts as visible unasked.
+
+use std::collections::VecDeque;
+
+use super::{Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Sim, Stage};
+use crate::part::PartId;
+
+/// The oracle.
+pub struct HierarchicalZ {
+    /// Draws; is never asked.
+    sim: Sim,
+    pyramid: Pyramid,
+    /// Whether anything was drawn since the pyramid was built.
+    stale: bool,
+    asked: u32,
+    open: Vec<Answer>,
+    submitted: VecDeque<Vec<Answer>>,
+}
+
+/// Farthest depths, level by level; level 0 is the image.
+#[derive(Debug, Default)]
+struct Pyramid {
+    levels: Vec<Level>,
+}
+
+#[derive(Debug)]
+struct Level {
+    width: usize,
+    height: usize,
+    texels: Vec<f32>,
+}
+
+impl Level {
+    /// The next one up.
+    fn halved(&self) -> Self {
+        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
+        let mut texels = Vec::with_capacity(width * height);
+        for y in 0..height {
+            for x in 0..width {
+                let mut farthest = 0.0_f32;
+                for row in 2 * y..(2 * y + 2).min(self.height) {
+                    for column in 2 * x..(2 * x + 2).min(self.width) {
+                        farthest = farthest.max(self.texels[row * self.width + column]);
+                    }
+                }
+                texels.push(farthest);
+            }
+        }
+        Self { width, height, texels }
+    }
+}
+
+impl Pyramid {
+    /// Over an image of `width` columns, row by row.
+    fn new(width: usize, depths: Vec<f32>) -> Self {
+        let mut levels = vec![Level { width, height: depths.len() / width, texels: depths }];
+        while let Some(last) = levels.last().filter(|level| level.texels.len() > 1) {
+            levels.push(last.halved());
+        }
+        Self { levels }
+    }
+
+    /// Whether a rectangle, columns `min[0]..max[0]` and rows `min[1]..max[1]`, may show a sample at
+    /// `depth` or beyond.
+    fn may_show(&self, min: [u32; 2], max: [u32; 2], depth: f32) -> bool {
+        let last = max.map(|end| end - 1);
+        let narrow = |k: &usize| (0..2).all(|axis| (last[axis] >> k) - (min[axis] >> k) <= 1);
+        let k = (0..self.levels.len()).find(narrow).unwrap_or(self.levels.len() - 1);
+        let level = &self.levels[k];
+        let texels = |axis: usize| (min[axis] >> k) as usize..=(last[axis] >> k) as usize;
+        texels(1).any(|y| texels(0).any(|x| level.texels[y * level.width + x] >= depth))
+    }
+}
+
+impl HierarchicalZ {
+    /// An image of its own over the stage.
+    ///
+    /// # Panics
+    /// Where the stage has not enough memory for its largest mesh.
+    #[must_use]
+    pub fn new(stage: Stage) -> Self {
+        Self {
+            sim: Sim::new(stage),
+            pyramid: Pyramid::default(),
+            stale: true,
+            asked: 0,
+            open: Vec::new(),
+            submitted: VecDeque::new(),
+        }
+    }
+}
+
+impl Oracle for HierarchicalZ {
+    fn name(&self) -> &'static str {
+        "hierarchical-z"
+    }
+
+    fn memory(&self) -> Option<Memory> {
+        self.sim.memory()
+    }
+
+    fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {
+        (self.stale, self.asked) = (true, 0);
+        self.open.clear();
+        self.submitted.clear();
+        self.sim.begin_frame(view)
+    }
+
+    fn draw_part(&mut self, part: PartId) {
+        self.stale = true;
+        self.sim.draw_part(part);
+    }
+
+    fn ask(&mut self, proxies: &[Proxy]) -> QueryId {
+        if self.stale && !proxies.is_empty() {
+            let image = self.sim.image();
+            let width = image.viewport().width as usize;
+            self.pyramid = Pyramid::new(width, image.depths().collect());
+            self.stale = false;
+        }
+        let visible = proxies.iter().any(|proxy| match *proxy {
+            Proxy::Rectangle { min, max, depth } => self.pyramid.may_show(min, max, depth),
+            Proxy::Box { .. } => true,
+        });
+        let query = QueryId(self.asked);
+        self.asked += 1;
+        self.open.push(Answer { query, visible });
+        query
+    }
+
+    fn submit(&mut self) -> Result<(), OracleError> {
+        self.submitted.push_back(std::mem::take(&mut self.open));
+        self.sim.submit()
+    }
+
+    fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
+        answers.extend(self.submitted.pop_front().unwrap_or_default());
+        self.sim.collect(&mut Vec::new())
+    }
+
+    fn read_back(&mut self) -> Result<Option<ReadBack>, OracleError> {
+        self.sim.read_back()
+    }
+
+    fn redraw(&mut self, _: &[PartId]) -> Result<Option<ReadBack>, OracleError> {
+        Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// Never "hidden" where a sample says "visible", whatever the sizes, and exact for a rectangle
+        /// that fills a texel.
+        #[test]
+        fn errs_towards_visible_alone(
+            width in 1_usize..70,
+            height in 1_usize..70,
+            far in proptest::collection::vec((0_usize..70, 0_usize..70, 0_u8..4), 0..6),
+            corners in [0.0..1.0_f64, 0.0..1.0, 0.0..1.0, 0.0..1.0],
+            depth in 0_u8..5,
+        ) {
+            let mut depths = vec![0.0; width * height];
+            for (x, y, d) in far {
+                depths[y % height * width + x % width] = f32::from(d) / 4.0;
+            }
+            let span = |a: f64, b: f64, side: usize| {
+                let low = (a.min(b) * side as f64) as u32;
+                (low, ((a.max(b) * side as f64) as u32).max(low + 1))
+            };
+            let ((x0, x1), (y0, y1)) =
+                (span(corners[0], corners[1], width), span(corners[2], corners[3], height));
+            let depth = f32::from(depth) / 4.0;
+            let pyramid = Pyramid::new(width, depths.clone());
+            let any = |[x0, y0]: [u32; 2], [x1, y1]: [u32; 2]| {
+                (y0..y1).any(|y| (x0..x1).any(|x| depths[y as usize * width + x as usize] >= depth))
+            };
+            if any([x0, y0], [x1, y1]) {
+                prop_assert!(pyramid.may_show([x0, y0], [x1, y1], depth));
+            }
+            // What the texels reach: at most the rectangle's own size more on each side.
+            let (wide, high) = (x1 - x0, y1 - y0);
+            let side = 2 * wide.max(high);
+            let reach = ([x0.saturating_sub(side), y0.saturating_sub(side)],
+                [(x1 + side).min(width as u32), (y1 + side).min(height as u32)]);
+            if pyramid.may_show([x0, y0], [x1, y1], depth) {
+                prop_assert!(any(reach.0, reach.1));
+            }
+            let whole = pyramid.may_show([0, 0], [width as u32, height as u32], depth);
+            prop_assert_eq!(whole, any([0, 0], [width as u32, height as u32]));
+        }
+    }
+}
