@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use plainsight::check::Gate;
-use plainsight::cull::{CullerKind, CullerSetup, ProxyKind};
+use plainsight::cull::{CULLERS, CullerKind, CullerSetup, ProxyKind};
 use plainsight::index::IndexKind;
 use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware};
 use plainsight::oracle::{Always, CostModel, HierarchicalZ, Oracle, Questions, Sim};
@@ -56,6 +56,42 @@ pub(crate) fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
             Box::new(Hardware::new(&stage, questions).unwrap())
         }
     }
+}
+
+/// Runs every culler through the gate, side by side: each frame's truth, and what the device keeps of the
+/// scene, serve all of them.
+pub(crate) fn gates(
+    world: &World,
+    index: IndexKind,
+    oracle_name: &str,
+    proxy: ProxyKind,
+) -> Vec<(&'static str, Gate)> {
+    let entries = world.entries();
+    let questions = Questions::of(oracle_name);
+    let stage = questions.map(|_| GpuStage::new(gpu(), &world.stage()).unwrap());
+    let mut gates: Vec<(&str, Gate)> =
+        CULLERS.iter().map(|culler| (culler.name, Gate::default())).collect();
+    let mut lanes: Vec<Lane<'_>> = Vec::new();
+    for (culler, (_, gate)) in CULLERS.iter().zip(&mut gates) {
+        let oracle = match (questions, &stage) {
+            (Some(questions), Some(stage)) => Box::new(Hardware::new(stage, questions).unwrap()),
+            _ => oracle(oracle_name, world),
+        };
+        let make = || {
+            (culler.make)(CullerSetup {
+                partition: world.partition.clone(),
+                index: (index.build)(&entries),
+                proxy,
+                cost: CostModel::lavapipe(),
+            })
+        };
+        let info = LaneInfo::of(culler.name, oracle.as_ref(), String::new());
+        let (culler, observer) = (Box::new(make), gate);
+        lanes.push(Lane { info, culler, oracle, observer, with_bound: false });
+    }
+    run(world, world.scene.frames, Repeat::first(1), &mut lanes, &mut || true).unwrap();
+    drop(lanes);
+    gates
 }
 
 /// Runs one lane through the gate.

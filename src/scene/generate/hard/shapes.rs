@@ -304,10 +304,10 @@ pub(super) const MANY: Generator = Generator {
 fn many(chosen: &Chosen) -> Result<Scene, SceneError> {
     let mut site = Site::default();
     let block = site.mesh(cube(DVec3::splat(0.12), 1));
-    for number in 0..scaled(chosen, 3600) {
-        let (column, row, layer) = (number % 60, number / 60 % 30, number / 1800);
-        let x = 0.15 * f64::from(column) - 4.5;
-        let y = 0.15 * f64::from(row) - 2.2;
+    for number in 0..scaled(chosen, 1000) {
+        let (column, row, layer) = (number % 40, number / 40 % 20, number / 800);
+        let x = 0.2 * f64::from(column) - 4.0;
+        let y = 0.2 * f64::from(row) - 2.0;
         site.at(block, x, y, -0.5 * f64::from(layer));
     }
     Ok(site.finish(chosen, MANY.name, before(chosen)))
