@@ -11,6 +11,7 @@ use crate::scene::Mesh;
 pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Mesh>, String> {
     let text = String::from_utf8_lossy(bytes);
     scan(&text)?;
+    let text = positions_alone(&text);
     let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
     // Materials are never wanted; tobj reports their absence beside the models.
     let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
@@ -28,6 +29,27 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Mesh>, String> {
         }
     }
     Ok(meshes)
+}
+
+/// The lines that are taken, faces without texture and normal indices: the crate multiplies with those,
+/// and with those of lines and points, unchecked.
+fn positions_alone(text: &str) -> String {
+    let mut kept = String::with_capacity(text.len());
+    for line in text.lines() {
+        match line.split_ascii_whitespace().next() {
+            Some("v" | "g" | "o") => kept.push_str(line),
+            Some("f") => {
+                kept.push('f');
+                for word in line.split_ascii_whitespace().skip(1) {
+                    kept.push(' ');
+                    kept.push_str(word.split('/').next().unwrap_or(""));
+                }
+            }
+            _ => continue,
+        }
+        kept.push('\n');
+    }
+    kept
 }
 
 /// Checks every vertex and face line; `tobj` takes NaN for a number and names no lines.
