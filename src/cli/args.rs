@@ -61,7 +61,7 @@ pub(super) struct SceneArgs {
     /// Seed of every random stream (default 1, or the scene file's).
     #[arg(long)]
     pub(super) seed: Option<u64>,
-    /// Frames to run (default 24, or the scene file's).
+    /// Frames to run (default 24, or what the scene says).
     #[arg(long)]
     pub(super) frames: Option<u32>,
     /// Size of generated scenes: 1 is a million triangles and more.
@@ -71,7 +71,7 @@ pub(super) struct SceneArgs {
     /// bunnies 300 meshes of 70,000.
     #[arg(long, conflicts_with = "scale")]
     pub(super) full_size: bool,
-    /// Pixels, WIDTHxHEIGHT (default 1280x1024).
+    /// Pixels, WIDTHxHEIGHT (default 1280x1024, or what the scene says).
     #[arg(long, value_parser = viewport)]
     pub(super) viewport: Option<Viewport>,
     /// A model (.obj, .gltf, .glb, .ply): in the place of the blob in bunnies, or the scene `model` itself.
@@ -80,7 +80,7 @@ pub(super) struct SceneArgs {
     /// Where the camera of the scene `model` goes.
     #[arg(long, value_enum)]
     pub(super) camera: Option<CameraArg>,
-    /// Most triangles in a part (default 3072, in hard scenes 48).
+    /// Most triangles in a part (default 3072, or what the scene says).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     pub(super) leaf: Option<u32>,
     /// What becomes of a triangle between two parts.
@@ -121,13 +121,13 @@ pub(super) struct SceneArgs {
 
 #[derive(Args, Clone)]
 pub(super) struct RunArgs {
-    /// Scenes by name, or scene files (default: bunnies city rooms soup).
+    /// Scenes by name (`hard/*`: all that begin so), or scene files (default: bunnies city rooms soup).
     #[arg(long, value_name = "NAME|FILE.toml", num_args = 1.., value_delimiter = ',')]
     pub(super) scene: Vec<String>,
     /// Cullers (default: full simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
-    /// Oracles: sim, hardware, pyramid, read-back, always (default: sim, and hardware where a Vulkan device is found).
+    /// Oracles: sim, hierarchical-z, hardware, pyramid, read-back, always (default: sim, and hardware where a Vulkan device is found).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) oracle: Vec<String>,
     #[command(flatten)]
@@ -148,7 +148,7 @@ pub(super) struct CompareArgs {
     /// Cullers (default: full full-adaptive full-trusting simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
-    /// Oracles: sim, hardware, pyramid, read-back, always (default: sim, and hardware where a Vulkan device is found).
+    /// Oracles: sim, hierarchical-z, hardware, pyramid, read-back, always (default: sim, and hardware where a Vulkan device is found).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) oracle: Vec<String>,
     /// Leaf sizes to compare, most triangles in a part (default: --leaf; at full size those that the

@@ -454,6 +454,13 @@ fn tell_table(rows: &[Row], cut: bool, streams: &mut Streams<'_>) -> Result<(), 
     if let Some(device) = rows.iter().find_map(|row| row.device.as_ref()) {
         writeln!(streams.out, "hardware: {device}")?;
     }
+    for row in rows.iter().filter(|row| row.may_missed > 0) {
+        writeln!(
+            streams.out,
+            "tolerance: {} {} {}: {} times a part was not drawn that shows exactly and need not show on the device",
+            row.scene, row.culler, row.oracle, row.may_missed
+        )?;
+    }
     if cut {
         writeln!(
             streams.out,

@@ -12,11 +12,11 @@
 //!    the unknown those drawn parts whose answer may spare work in the next frames. A question costs
 //!    what the model says; what it may save is the work behind it times the odds of "hidden", learned
 //!    as answers come. Questions that do not pay are not asked, nor is a batch that does not pay for its
-//!    round trip; what they were about is drawn.
+//!    round trip and for the wait ([`DRAIN`]); what they were about is drawn.
 //! 4. What a batch finds visible is drawn, at most as much as was drawn before it and the nearest of it:
 //!    the rest may be hidden by it and is asked about once more. What is drawn together is drawn in the
 //!    order of the walk: by their nearest corners, large parts would come before what hides them.
-//! 5. Questions in a frame may cost no more than they are known to have saved in it, and the allowance
+//! 5. Questions in a frame may cost no more than they surely saved in it ([`SURELY_SAVED`]), and the allowance
 //!    of what frustum culling would cost (step 4 of the walk adds that up). So the bound holds for
 //!    virtual time by construction, and for wall time as far as the model is true.
 //!

@@ -145,9 +145,9 @@ impl Scenery {
 
     /// Relinks what moved, renews the bounds of inner nodes, and makes `history` fit: as many entries
     /// as there are slots; nodes that the index made anew inherit from what is below them.
-    pub fn begin_frame<M: NodeHistory>(&mut self, view: &View<'_>, history: &mut Vec<M>) {
+    pub fn begin_frame<H: NodeHistory>(&mut self, view: &View<'_>, history: &mut Vec<H>) {
         self.index.update(view.moves);
-        history.resize(self.slot_count(), M::default());
+        history.resize(self.slot_count(), H::default());
         self.pass_on(history);
         let count = self.index.node_count() as usize;
         self.node_error.clear();
@@ -173,7 +173,7 @@ impl Scenery {
 
     /// Forgets what was remembered under the numbers of nodes that the index made anew, and takes over
     /// what is known of the objects in them.
-    fn pass_on<M: NodeHistory>(&self, history: &mut [M]) {
+    fn pass_on<H: NodeHistory>(&self, history: &mut [H]) {
         let rebuilt = self.index.rebuilt();
         if rebuilt.is_empty() {
             return;
@@ -181,7 +181,7 @@ impl Scenery {
         let mut anew = vec![false; self.index.node_count() as usize];
         for &node in rebuilt {
             anew[node.0 as usize] = true;
-            history[self.slot(Item::Scene(node))] = M::default();
+            history[self.slot(Item::Scene(node))] = H::default();
         }
         for &node in self.index.top_down().iter().rev() {
             let slot = self.slot(Item::Scene(node));

@@ -79,3 +79,25 @@ pub(super) fn absolute(matrix: &DMat4) -> DMat4 {
 pub fn rounded_clip_matrix(clip_from_object: &DMat4) -> [f32; 16] {
     clip_from_object.to_cols_array().map(|entry| entry as f32)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A huge mesh under a tiny scale: entries of the matrix are subnormal, or zero on a device that
+    /// flushes them, while the products are not small at all.
+    #[test]
+    fn tiny_entries_times_huge_coordinates_stay_within_the_bound() {
+        for scale in [1.0e-37, 3.0e-39, 7.0e-41, 2.0e-44] {
+            let world = DMat4::from_scale(DVec3::splat(scale));
+            let reach = DVec3::splat(3.0e38);
+            let bound = ClipError::of(&DMat4::IDENTITY, &world, reach).bound[0];
+            let (exact, entry) = (scale * reach.x, scale as f32);
+            let flushed = if entry.is_normal() { entry } else { 0.0 };
+            for entry in [entry, flushed] {
+                let error = (f64::from(entry * 3.0e38_f32) - exact).abs();
+                assert!(error <= bound, "{scale}: {error} beyond {bound}");
+            }
+        }
+    }
+}

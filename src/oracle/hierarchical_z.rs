@@ -12,8 +12,7 @@
 //! Its depth is the reference's, so what it may add to `sim` is only "visible". It loses where rectangles
 //! are large or straddle texels. A box is no rectangle: it counts as visible unasked.
 
-use std::collections::VecDeque;
-
+use super::batches::Batches;
 use super::{Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Sim, Stage};
 use crate::part::PartId;
 
@@ -24,9 +23,7 @@ pub struct HierarchicalZ {
     pyramid: Pyramid,
     /// Whether anything was drawn since the pyramid was built.
     stale: bool,
-    asked: u32,
-    open: Vec<Answer>,
-    submitted: VecDeque<Vec<Answer>>,
+    answers: Batches,
 }
 
 /// Farthest depths, level by level; level 0 is the image.
@@ -95,9 +92,7 @@ impl HierarchicalZ {
             sim: Sim::new(stage),
             pyramid: Pyramid::default(),
             stale: true,
-            asked: 0,
-            open: Vec::new(),
-            submitted: VecDeque::new(),
+            answers: Batches::default(),
         }
     }
 }
@@ -112,9 +107,8 @@ impl Oracle for HierarchicalZ {
     }
 
     fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {
-        (self.stale, self.asked) = (true, 0);
-        self.open.clear();
-        self.submitted.clear();
+        self.stale = true;
+        self.answers.clear();
         self.sim.begin_frame(view)
     }
 
@@ -134,19 +128,16 @@ impl Oracle for HierarchicalZ {
             Proxy::Rectangle { min, max, depth } => self.pyramid.may_show(min, max, depth),
             Proxy::Box { .. } => true,
         });
-        let query = QueryId(self.asked);
-        self.asked += 1;
-        self.open.push(Answer { query, visible });
-        query
+        self.answers.answer(visible)
     }
 
     fn submit(&mut self) -> Result<(), OracleError> {
-        self.submitted.push_back(std::mem::take(&mut self.open));
+        self.answers.submit();
         self.sim.submit()
     }
 
     fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
-        answers.extend(self.submitted.pop_front().unwrap_or_default());
+        self.answers.collect(answers);
         self.sim.collect(&mut Vec::new())
     }
 

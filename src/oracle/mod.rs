@@ -9,6 +9,7 @@
 //! asking order, so that no culler sees arrival times. An answer may err only towards "visible".
 
 mod always;
+mod batches;
 mod cost;
 mod fit;
 mod hierarchical_z;

@@ -1,11 +1,10 @@
 //! The simulated device: the reference rasterizer behind the command stream. It answers every
 //! question exactly and at once; draws between two questions go to the renderer together.
 
-use std::collections::VecDeque;
-
 use plainsight_reference::fast::Instance;
 use plainsight_reference::{Draw, Faces, Image, fast};
 
+use super::batches::Batches;
 use super::proxy_mesh::box_triangles;
 use super::{
     Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Residency, Stage,
@@ -18,9 +17,7 @@ pub struct Sim {
     image: Image,
     matrices: Vec<[f32; 16]>,
     waiting: Vec<PartId>,
-    asked: u32,
-    open: Vec<Answer>,
-    submitted: VecDeque<Vec<Answer>>,
+    answers: Batches,
     /// Where memory is limited: what a device would hold.
     residency: Option<Residency>,
 }
@@ -75,9 +72,7 @@ impl Sim {
             image,
             matrices: Vec::new(),
             waiting: Vec::new(),
-            asked: 0,
-            open: Vec::new(),
-            submitted: VecDeque::new(),
+            answers: Batches::default(),
             residency,
         }
     }
@@ -113,9 +108,7 @@ impl Oracle for Sim {
         self.matrices.clear();
         self.matrices.extend_from_slice(view.clip_from_object);
         self.waiting.clear();
-        self.asked = 0;
-        self.open.clear();
-        self.submitted.clear();
+        self.answers.clear();
         if let Some(residency) = &mut self.residency {
             residency.begin_frame(view, &mut Vec::new());
         }
@@ -149,21 +142,18 @@ impl Oracle for Sim {
             }
         };
         let visible = proxies.iter().any(any);
-        let query = QueryId(self.asked);
-        self.asked += 1;
-        self.open.push(Answer { query, visible });
-        query
+        self.answers.answer(visible)
     }
 
     fn submit(&mut self) -> Result<(), OracleError> {
         // A device draws what it is sent: frames without questions are timed with their drawing too.
         self.flush();
-        self.submitted.push_back(std::mem::take(&mut self.open));
+        self.answers.submit();
         Ok(())
     }
 
     fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
-        answers.extend(self.submitted.pop_front().unwrap_or_default());
+        self.answers.collect(answers);
         Ok(())
     }
 

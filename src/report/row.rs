@@ -8,7 +8,7 @@ use crate::oracle::MIB;
 use crate::run::{Trace, World};
 
 /// Version of the JSON line; it grows when a field changes its meaning or goes.
-pub const JSON_SCHEMA: u32 = 1;
+pub const JSON_SCHEMA: u32 = 2;
 
 /// One lane's result. Counts are sums over the frames.
 #[derive(Clone, Debug, Serialize)]
@@ -37,9 +37,13 @@ pub struct Row {
     pub fragments: u32,
     /// Samples of frame 0 at which the cut scene shows another source triangle than the uncut one.
     pub partition_difference_pixels: u64,
-    /// Visible parts that were not drawn.
+    /// Parts that must be visible on the lane's device and were not drawn.
     pub must_missed: u64,
-    /// Whether the reference's images of the drawn parts equal those of all parts.
+    /// Parts that the exact truth shows, a device within the tolerance need not show, and that were not
+    /// drawn. None where the lane's device is exact.
+    pub may_missed: u64,
+    /// Whether the reference's images of the drawn parts equal those of all parts, wherever the
+    /// tolerance leaves no doubt.
     pub image_equal: bool,
     /// Whether the device's images do; null where no device drew.
     pub device_image_equal: Option<bool>,
@@ -89,6 +93,7 @@ impl Row {
             fragments: world.partition.fragment_count(),
             partition_difference_pixels,
             must_missed: gate.conservative.misses().len() as u64,
+            may_missed: gate.conservative.may_missed(),
             image_equal: gate.image.differences().is_empty(),
             device_image_equal: gate.device_image.equal(),
             drawn_parts: gate.excess.drawn(),

@@ -9,6 +9,27 @@
 //! frames = 10
 //! viewport = [640, 480]
 //! ```
+//!
+//! ```toml
+//! version = 1
+//! leaf_triangles = 48                      # most in a part
+//! [[objects]]
+//! positions = [[0,0,0], [1,0,0], [0,1,0]]
+//! triangles = [[0,1,2]]
+//! translation = [0,0,-3]                   # all of these are optional
+//! rotation_y_degrees = 30
+//! scale = [1,-2,1]
+//! shear = [0.5,0,0]                        # x leans with y, x with z, y with z
+//! reflect = { velocity = [1,0,0], min = [-5,0,0], max = [5,0,0], spin = 0.1 }
+//! jumps = { offsets = [[0,0,0], [0,9,0]], period = 4 }
+//! [camera_path]
+//! poses = [{ eye = [0,0,5], target = [0,0,0] }]
+//! travel = "jump"                          # or "glide", the default
+//! fov_y_degrees = 60                       # or orthographic_height = 4
+//! shift = [0.5,0]                          # how far the view direction is off the middle
+//! near = 0.1
+//! far = inf                                # or a number
+//! ```
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -255,6 +255,12 @@ pub enum SceneError {
         /// What there is, for the message.
         known: String,
     },
+    /// A pattern that no scene's name fits.
+    #[error("no scene fits '{pattern}'; `plainsight list` names them all")]
+    NoneMatches {
+        /// What was asked for.
+        pattern: String,
+    },
     /// A knob out of its range.
     #[error("{knob} must be {range}, got {got}")]
     Knob {

@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use plainsight::check::Gate;
-use plainsight::cull::{CULLERS, CullerKind, CullerSetup, ProxyKind};
+use plainsight::cull::{CullerKind, CullerSetup, ProxyKind};
 use plainsight::index::IndexKind;
 use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware};
 use plainsight::oracle::{Always, CostModel, HierarchicalZ, Oracle, Questions, Sim};
@@ -58,21 +58,22 @@ pub(crate) fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
     }
 }
 
-/// Runs every culler through the gate, side by side: each frame's truth, and what the device keeps of the
+/// Runs cullers through the gate, side by side: each frame's truth, and what the device keeps of the
 /// scene, serve all of them.
 pub(crate) fn gates(
     world: &World,
+    cullers: &[CullerKind],
     index: IndexKind,
     oracle_name: &str,
     proxy: ProxyKind,
-) -> Vec<(&'static str, Gate)> {
+) -> Vec<(Trace, Gate)> {
     let entries = world.entries();
     let questions = Questions::of(oracle_name);
     let stage = questions.map(|_| GpuStage::new(gpu(), &world.stage()).unwrap());
-    let mut gates: Vec<(&str, Gate)> =
-        CULLERS.iter().map(|culler| (culler.name, Gate::default())).collect();
+    let mut gates: Vec<Gate> = Vec::new();
+    gates.resize_with(cullers.len(), Gate::default);
     let mut lanes: Vec<Lane<'_>> = Vec::new();
-    for (culler, (_, gate)) in CULLERS.iter().zip(&mut gates) {
+    for (culler, gate) in cullers.iter().zip(&mut gates) {
         let oracle = match (questions, &stage) {
             (Some(questions), Some(stage)) => Box::new(Hardware::new(stage, questions).unwrap()),
             _ => oracle(oracle_name, world),
@@ -85,13 +86,15 @@ pub(crate) fn gates(
                 cost: CostModel::lavapipe(),
             })
         };
-        let info = LaneInfo::of(culler.name, oracle.as_ref(), String::new());
+        let replay = format!("scene {} seed {}", world.scene.name, world.scene.seed);
+        let info = LaneInfo::of(culler.name, oracle.as_ref(), replay);
         let (culler, observer) = (Box::new(make), gate);
         lanes.push(Lane { info, culler, oracle, observer, with_bound: false });
     }
-    run(world, world.scene.frames, Repeat::first(1), &mut lanes, &mut || true).unwrap();
+    let frames = world.scene.frames;
+    let traces = run(world, frames, Repeat::first(1), &mut lanes, &mut || true).unwrap();
     drop(lanes);
-    gates
+    traces.into_iter().zip(gates).collect()
 }
 
 /// Runs one lane through the gate.
@@ -102,22 +105,5 @@ pub(crate) fn gate(
     oracle_name: &str,
     proxy: ProxyKind,
 ) -> (Trace, Gate) {
-    let entries = world.entries();
-    let make = || {
-        (culler.make)(CullerSetup {
-            partition: world.partition.clone(),
-            index: (index.build)(&entries),
-            proxy,
-            cost: CostModel::lavapipe(),
-        })
-    };
-    let oracle = oracle(oracle_name, world);
-    let replay = format!("scene {} seed {}", world.scene.name, world.scene.seed);
-    let info = LaneInfo::of(culler.name, oracle.as_ref(), replay);
-    let mut gate = Gate::default();
-    let (culler, observer) = (Box::new(make), &mut gate);
-    let lane = Lane { info, culler, oracle, observer, with_bound: false };
-    let mut traces =
-        run(world, world.scene.frames, Repeat::first(1), &mut [lane], &mut || true).unwrap();
-    (traces.pop().unwrap(), gate)
+    gates(world, &[culler], index, oracle_name, proxy).pop().expect("one culler makes one lane")
 }

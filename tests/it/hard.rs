@@ -1,17 +1,18 @@
 //! The hard scenes: every culler over every index holds on the simulated device, and on the real one.
 
-use plainsight::cull::ProxyKind;
-use plainsight::index::INDEXES;
+use plainsight::cull::{CULLERS, CullerKind, ProxyKind};
+use plainsight::index::{INDEXES, IndexKind};
 use plainsight::part::PartitionKnobs;
 use plainsight::run::World;
 use plainsight::scene::generate::{HARD, Knobs, build};
 
 use crate::common::gates;
 
-/// Frames of the long scenes here; `run --scene 'hard/*'` goes through all of them.
-const FRAMES: u32 = 8;
-/// The same on the real device, where each round trip takes its time.
-const DEVICE_FRAMES: u32 = 3;
+/// Most frames of a scene here; `run --scene 'hard/*'` goes through all of them. As many as it takes for
+/// boxes to be tightened and loosened, things to jump and the index to be built anew twice.
+const FRAMES: u32 = 20;
+/// The same where each round trip takes its time.
+const FEW_FRAMES: u32 = 3;
 
 fn worlds(most: u32) -> impl Iterator<Item = World> {
     HARD.iter().map(move |generator| {
@@ -22,18 +23,17 @@ fn worlds(most: u32) -> impl Iterator<Item = World> {
     })
 }
 
-fn hold((oracle, frames): (&str, u32), indexes: usize, proxies: &[ProxyKind]) {
+/// Every culler holds in every scene, and none makes use of the device's tolerance.
+fn hold(cullers: &[CullerKind], (oracle, frames): (&str, u32), index: IndexKind, proxy: ProxyKind) {
     let mut failures = Vec::new();
     for world in worlds(frames) {
-        for index in &INDEXES[..indexes] {
-            for &proxy in proxies {
-                for (culler, gate) in gates(&world, *index, oracle, proxy) {
-                    if !gate.held() {
-                        let (scene, index) = (&world.scene.name, index.name);
-                        let why = gate.failures().join("; ");
-                        failures.push(format!("{scene} {culler} {index} {proxy:?}: {why}"));
-                    }
-                }
+        for (trace, gate) in gates(&world, cullers, index, oracle, proxy) {
+            let forgiven = gate.conservative.may_missed();
+            if !gate.held() || forgiven > 0 {
+                let (scene, culler) = (&world.scene.name, &trace.lane.culler);
+                let why = gate.failures().join("; ");
+                failures
+                    .push(format!("{scene} {culler} {}: {forgiven} forgiven; {why}", index.name));
             }
         }
     }
@@ -41,13 +41,24 @@ fn hold((oracle, frames): (&str, u32), indexes: usize, proxies: &[ProxyKind]) {
 }
 
 #[test]
-fn every_culler_holds_on_the_simulated_device() {
-    hold(("sim", FRAMES), INDEXES.len(), &[ProxyKind::Rectangle]);
-    hold(("sim", FRAMES), 1, &[ProxyKind::Box]);
-    hold(("hierarchical-z", DEVICE_FRAMES), 1, &[ProxyKind::Rectangle]);
+fn every_culler_holds_over_every_index() {
+    for (place, &index) in INDEXES.iter().enumerate() {
+        let frames = if place == 0 { FRAMES } else { FEW_FRAMES };
+        hold(CULLERS, ("sim", frames), index, ProxyKind::Rectangle);
+    }
+}
+
+#[test]
+fn every_culler_holds_with_boxes_and_by_pyramids() {
+    hold(CULLERS, ("sim", FEW_FRAMES), INDEXES[0], ProxyKind::Box);
+    // A pyramid is built for each round trip: not for those that make thousands.
+    let many_trips = ["simple", "full-waits"];
+    let few: Vec<CullerKind> =
+        CULLERS.iter().filter(|culler| !many_trips.contains(&culler.name)).copied().collect();
+    hold(&few, ("hierarchical-z", FEW_FRAMES), INDEXES[0], ProxyKind::Rectangle);
 }
 
 #[test]
 fn every_culler_holds_on_the_real_device() {
-    hold(("hardware", DEVICE_FRAMES), 1, &[ProxyKind::Rectangle]);
+    hold(CULLERS, ("hardware", FEW_FRAMES), INDEXES[0], ProxyKind::Rectangle);
 }

@@ -188,7 +188,7 @@ pub fn build(name: &str, knobs: &Knobs) -> Result<Scene, SceneError> {
 /// one without stands for itself.
 ///
 /// # Errors
-/// [`SceneError::Unknown`] where nothing matches.
+/// [`SceneError::NoneMatches`] where nothing does.
 pub fn matching(pattern: &str) -> Result<Vec<String>, SceneError> {
     let Some((head, tail)) = pattern.split_once('*') else { return Ok(vec![pattern.to_owned()]) };
     let matches = |name: &str| {
@@ -197,8 +197,7 @@ pub fn matching(pattern: &str) -> Result<Vec<String>, SceneError> {
     let names = GENERATORS.iter().chain(HARD).map(|g| g.name);
     let found: Vec<String> = names.filter(|name| matches(name)).map(str::to_owned).collect();
     if found.is_empty() {
-        let known = "see `plainsight list`".to_owned();
-        return Err(SceneError::Unknown { name: pattern.to_owned(), known });
+        return Err(SceneError::NoneMatches { pattern: pattern.to_owned() });
     }
     Ok(found)
 }

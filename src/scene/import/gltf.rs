@@ -2,7 +2,8 @@
 //! read here, because a hostile one must not be able to panic. Every triangle primitive of every node of
 //! the default scene becomes a mesh where the scene puts it; animations and skins are at rest.
 
-use std::path::Path;
+use std::io::Read as _;
+use std::path::{Component, Path};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -15,10 +16,14 @@ use gltf::{Accessor, Document, Gltf, Node, Primitive, Semantic};
 use super::short;
 use crate::scene::Mesh;
 
+/// Most vertices of all meshes where the scene puts them, and most indices. Any number of nodes may show
+/// one mesh, and any number of primitives one accessor: a small file could ask for all memory there is.
+const MOST_VERTICES: usize = 1 << 27;
+
 /// Reads the buffers beside the file as well, where there is a folder to look in.
 pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Vec<Mesh>, String> {
     let said = |error: gltf::Error| format!("not a glTF file that can be read: {error}");
-    let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).map_err(said)?;
+    let Gltf { document, mut blob } = Gltf::from_slice_without_validation(bytes).map_err(said)?;
     // The crate's own checks take this one for granted, and panic.
     let root = document.into_json();
     for (number, mesh) in root.meshes.iter().enumerate() {
@@ -33,15 +38,13 @@ pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Vec<Mesh>, St
     for buffer in document.buffers() {
         let number = buffer.index();
         let data = match buffer.source() {
-            Source::Bin => blob.clone().unwrap_or_default(),
-            Source::Uri(uri) => match (uri.strip_prefix("data:"), folder) {
-                (Some(data), _) => {
-                    inline(data).map_err(|what| format!("buffer {number}: {what}"))?
-                }
-                (None, Some(folder)) => std::fs::read(folder.join(uri))
-                    .map_err(|error| format!("buffer {number}, '{}': {error}", short(uri)))?,
-                (None, None) => return Err(format!("buffer {number} is in another file")),
-            },
+            // There is one such chunk in a file, for one buffer.
+            Source::Bin => blob.take().unwrap_or_default(),
+            Source::Uri(uri) => match uri.strip_prefix("data:") {
+                Some(data) => inline(data),
+                None => beside(folder, uri, buffer.length()),
+            }
+            .map_err(|what| format!("buffer {number}: {what}"))?,
         };
         if data.len() < buffer.length() {
             let (has, wants) = (data.len(), buffer.length());
@@ -49,7 +52,25 @@ pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Vec<Mesh>, St
         }
         buffers.push(data);
     }
-    placed(&document, &buffers)
+    placed(&document, &buffers, MOST_VERTICES)
+}
+
+/// The first `length` bytes of the file of that name in `folder`. A model may name neighbours and what is
+/// below them, nothing else on the machine, and nothing that has no end.
+fn beside(folder: Option<&Path>, uri: &str, length: usize) -> Result<Vec<u8>, String> {
+    let Some(folder) = folder else { return Err(format!("'{}' is another file", short(uri))) };
+    let plain = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    if !Path::new(uri).components().all(plain) {
+        return Err(format!("'{}' is not beside the model; put it there", short(uri)));
+    }
+    let path = folder.join(uri);
+    let said = |error: std::io::Error| format!("'{}': {error}", short(uri));
+    if !std::fs::metadata(&path).map_err(said)?.is_file() {
+        return Err(format!("'{}' is no file", short(uri)));
+    }
+    let (mut data, file) = (Vec::new(), std::fs::File::open(&path).map_err(said)?);
+    file.take(length as u64).read_to_end(&mut data).map_err(said)?;
+    Ok(data)
 }
 
 /// What a data URI holds, after `data:`.
@@ -61,7 +82,7 @@ fn inline(data: &str) -> Result<Vec<u8>, String> {
 }
 
 /// The meshes of the default scene, of the first one, or of all nodes without a parent.
-fn placed(document: &Document, buffers: &[Vec<u8>]) -> Result<Vec<Mesh>, String> {
+fn placed(document: &Document, buffers: &[Vec<u8>], most: usize) -> Result<Vec<Mesh>, String> {
     let mut stack: Vec<(Node<'_>, DMat4)> = Vec::new();
     match document.default_scene().or_else(|| document.scenes().next()) {
         Some(scene) => stack.extend(scene.nodes().map(|node| (node, DMat4::IDENTITY))),
@@ -77,6 +98,7 @@ fn placed(document: &Document, buffers: &[Vec<u8>]) -> Result<Vec<Mesh>, String>
     }
     stack.reverse();
     let (mut seen, mut meshes) = (vec![false; document.nodes().len()], Vec::new());
+    let mut left = most;
     while let Some((node, from_parent)) = stack.pop() {
         if std::mem::replace(&mut seen[node.index()], true) {
             return Err(format!("node {} has two parents; nodes must form a tree", node.index()));
@@ -88,6 +110,11 @@ fn placed(document: &Document, buffers: &[Vec<u8>]) -> Result<Vec<Mesh>, String>
                 let what = |what: String| {
                     format!("mesh {}, primitive {}: {what}", mesh.index(), primitive.index())
                 };
+                let counts = [primitive.get(&Semantic::Positions), primitive.indices()];
+                let count = counts.iter().flatten().map(Accessor::count).max().unwrap_or(0);
+                left = left.checked_sub(count).ok_or_else(|| {
+                    format!("has more than {most} vertices or indices in all; split it")
+                })?;
                 if let Some(read) = triangles(&primitive, buffers).map_err(what)? {
                     let name =
                         mesh.name().map_or_else(|| format!("mesh {}", mesh.index()), str::to_owned);
@@ -226,6 +253,34 @@ mod tests {
     }
 
     #[test]
+    fn what_many_nodes_share_counts_for_each() {
+        let gltf = Gltf::from_slice(text().as_bytes()).unwrap();
+        let (document, data) = (gltf.document, vec![vec![0; 42]]);
+        assert_eq!(placed(&document, &data, 3).unwrap().len(), 1);
+        assert!(placed(&document, &data, 2).unwrap_err().contains("more than 2 vertices"));
+    }
+
+    #[test]
+    fn buffers_come_from_beside_the_model_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("data.bin"), [7; 9]).unwrap();
+        std::fs::create_dir(folder.path().join("sub")).unwrap();
+        let beside = |uri: &str, length| beside(Some(folder.path()), uri, length);
+        assert_eq!(beside("data.bin", 4).unwrap(), [7; 4]);
+        assert_eq!(beside("./data.bin", 99).unwrap().len(), 9);
+        for (uri, says) in [
+            ("/dev/zero", "not beside"),
+            ("../data.bin", "not beside"),
+            ("sub/../../x", "not beside"),
+            ("sub", "is no file"),
+            ("gone.bin", "'gone.bin': "),
+        ] {
+            assert!(beside(uri, 4).unwrap_err().contains(says), "{uri}");
+        }
+        assert!(super::beside(None, "data.bin", 4).unwrap_err().contains("another file"));
+    }
+
+    #[test]
     fn refusals_are_one_line() {
         let text = text();
         for (text, says) in [
@@ -239,7 +294,7 @@ mod tests {
                     r#""count":3,"type":"SCALAR""#,
                     r#""count":18446744073709551615,"type":"SCALAR""#,
                 ),
-                "accessor 1 reaches",
+                "more than 134217728 vertices",
             ),
             (text.replace("\"byteLength\":42", "\"byteLength\":420"), "buffer 0 has 42 of 420"),
             (text.replace(";base64,", ";base64,*"), "buffer 0: "),

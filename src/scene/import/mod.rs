@@ -1,6 +1,7 @@
 //! Import of models, one format per file, each through a crate of its own and behind checks that name
 //! the place of what is refused. Positions and triangles are taken, nothing else. No file, however
-//! broken or hostile, makes it panic or take more memory than some multiple of the file's size.
+//! broken or hostile, makes it panic, or take more memory than some multiple of the file's size and, for
+//! glTF, whose nodes may share meshes, of a number of vertices.
 
 mod gltf;
 mod obj;
