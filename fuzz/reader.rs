@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use plainsight::part::PartitionKnobs;
-use plainsight::run::{FrameState, World};
+use plainsight::run::{FrameState, Moment, World};
 use plainsight::scene::generate::Knobs;
 use plainsight::scene::import::{Format, parse};
 use plainsight::scene::{Mesh, Scene, SceneError, file};
@@ -49,8 +49,10 @@ pub(super) fn scene(bytes: &[u8]) {
                 ..PartitionKnobs::default()
             };
             let world = World::new(scene, knobs);
-            for t in [0, 1, 999_999] {
-                let _ = FrameState::at(&world, t);
+            for frame in [0, 1, 999_999] {
+                for view in 0..world.views() {
+                    let _ = FrameState::at(&world, Moment { frame, view });
+                }
             }
         }
         Ok(_) => {}

@@ -6,13 +6,13 @@
 use plainsight_reference::{Fate, Tolerance};
 
 use crate::part::PartId;
-use crate::run::FrameRecord;
+use crate::run::{FrameRecord, Moment};
 
 /// A visible part that was not drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Miss {
-    /// The frame.
-    pub frame: u32,
+    /// The frame and view.
+    pub moment: Moment,
     /// The part.
     pub part: PartId,
     /// How many samples show it.
@@ -50,7 +50,7 @@ impl Conservative {
                     .expect("a part with visible pixels shows at a sample");
                 let width = truth.image.viewport().width;
                 let first_pixel = [sample as u32 % width, sample as u32 / width];
-                self.misses.push(Miss { frame: record.state.frame, part, pixels, first_pixel });
+                self.misses.push(Miss { moment: record.state.moment, part, pixels, first_pixel });
             }
         }
     }

@@ -2,13 +2,13 @@
 //! frame that got more "visible" answers than it asked questions.
 
 use crate::cull::Counts;
-use crate::run::FrameRecord;
+use crate::run::{FrameRecord, Moment};
 
 /// Sums over the frames.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CountsCheck {
     total: Counts,
-    overcounted: Option<u32>,
+    overcounted: Option<Moment>,
 }
 
 impl CountsCheck {
@@ -22,7 +22,7 @@ impl CountsCheck {
         self.total.visible_answers += counts.visible_answers;
         self.total.round_trips += counts.round_trips;
         if counts.visible_answers > counts.queries {
-            self.overcounted.get_or_insert(record.state.frame);
+            self.overcounted.get_or_insert(record.state.moment);
         }
     }
 
@@ -34,7 +34,7 @@ impl CountsCheck {
 
     /// The first frame with more answers than questions.
     #[must_use]
-    pub fn overcounted(&self) -> Option<u32> {
+    pub fn overcounted(&self) -> Option<Moment> {
         self.overcounted
     }
 }

@@ -1,12 +1,12 @@
 //! **determinism**: a frame run again by a new culler leaves the same trace.
 
-use crate::run::{FrameTrace, HASH_START};
+use crate::run::{FrameTrace, HASH_START, Moment};
 
 /// Compares repeated frames.
 #[derive(Clone, Debug, Default)]
 pub struct Determinism {
     compared: u32,
-    first_difference: Option<u32>,
+    first_difference: Option<Moment>,
 }
 
 impl Determinism {
@@ -14,7 +14,7 @@ impl Determinism {
     pub fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
         self.compared += 1;
         if first.fold_into(HASH_START) != again.fold_into(HASH_START) {
-            self.first_difference.get_or_insert(first.frame);
+            self.first_difference.get_or_insert(first.moment);
         }
     }
 
@@ -26,7 +26,7 @@ impl Determinism {
 
     /// The first frame whose repetition differed.
     #[must_use]
-    pub fn first_difference(&self) -> Option<u32> {
+    pub fn first_difference(&self) -> Option<Moment> {
         self.first_difference
     }
 }

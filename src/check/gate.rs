@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::{Conservative, CountsCheck, Determinism, DeviceImage, Excess, ImageCheck};
-use crate::cull::{Culler, CullerSetup, ProxyKind};
+use crate::cull::{Culler, CullerSetup, PerView, ProxyKind};
 use crate::index::INDEXES;
 use crate::oracle::{CostModel, Oracle, Sim};
 use crate::part::PartitionKnobs;
@@ -63,8 +63,8 @@ impl Gate {
         for miss in misses.iter().take(NAMED_MISSES) {
             let [x, y] = miss.first_pixel;
             lines.push(format!(
-                "set: frame {} part {} is visible in {} pixels, first at ({x}, {y}), and was not drawn",
-                miss.frame, miss.part.0, miss.pixels
+                "set: {} part {} is visible in {} pixels, first at ({x}, {y}), and was not drawn",
+                miss.moment, miss.part.0, miss.pixels
             ));
         }
         if misses.len() > NAMED_MISSES {
@@ -78,18 +78,18 @@ impl Gate {
             if let Some(first) = differences.first() {
                 let [x, y] = first.first_pixel;
                 lines.push(format!(
-                    "{check}: {} frames differ, first frame {} in {} pixels, first at ({x}, {y})",
+                    "{check}: {} frames differ, first {} in {} pixels, first at ({x}, {y})",
                     differences.len(),
-                    first.frame,
+                    first.moment,
                     first.pixels
                 ));
             }
         }
-        if let Some(frame) = self.determinism.first_difference() {
-            lines.push(format!("determinism: frame {frame} left another trace when run again"));
+        if let Some(moment) = self.determinism.first_difference() {
+            lines.push(format!("determinism: {moment} left another trace when run again"));
         }
-        if let Some(frame) = self.counts.overcounted() {
-            lines.push(format!("counts: frame {frame} has more answers than questions"));
+        if let Some(moment) = self.counts.overcounted() {
+            lines.push(format!("counts: {moment} has more answers than questions"));
         }
         lines
     }
@@ -133,11 +133,13 @@ pub fn judge(
     let world = World::new(scene, PartitionKnobs::default());
     let entries = world.entries();
     let culler = || {
-        make(CullerSetup {
-            partition: world.partition.clone(),
-            index: (INDEXES[0].build)(&entries),
-            proxy: ProxyKind::Rectangle,
-            cost: CostModel::lavapipe(),
+        PerView::over(world.views(), || {
+            make(CullerSetup {
+                partition: world.partition.clone(),
+                index: (INDEXES[0].build)(&entries),
+                proxy: ProxyKind::Rectangle,
+                cost: CostModel::lavapipe(),
+            })
         })
     };
     let stage = world.stage();

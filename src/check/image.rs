@@ -3,13 +3,13 @@
 
 use plainsight_reference::{Image, Tolerance};
 
-use crate::run::{FrameRecord, render};
+use crate::run::{FrameRecord, Moment, render};
 
 /// A sample where two images differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Difference {
-    /// The frame.
-    pub frame: u32,
+    /// The frame and view.
+    pub moment: Moment,
     /// How many samples differ.
     pub pixels: u32,
     /// Column and row of the first of them, row 0 on top.
@@ -33,7 +33,7 @@ impl Difference {
         }
         let first = first?;
         let first_pixel = [first % viewport.width, first / viewport.width];
-        Some(Self { frame: record.state.frame, pixels, first_pixel })
+        Some(Self { moment: record.state.moment, pixels, first_pixel })
     }
 }
 

@@ -206,6 +206,9 @@ pub(super) struct PictureArgs {
     /// Which frame, from 0; the frames before it are run too.
     #[arg(long, default_value_t = 0)]
     pub(super) frame: u32,
+    /// Which of the frame's views, from 0.
+    #[arg(long, default_value_t = 0)]
+    pub(super) view: u32,
     /// What to draw.
     #[arg(long, value_enum, default_value_t = Layer::Parts)]
     pub(super) layer: Layer,

@@ -13,7 +13,7 @@ use crate::cull::CullerKind;
 use crate::oracle::CostModel;
 use crate::part::Made;
 use crate::report::{Comparison, picture_png, wrapped};
-use crate::run::{Repeat, Trace, depth_complexity};
+use crate::run::{FrameState, Moment, Repeat, Trace, depth_complexity};
 
 /// The scenes of the paper.
 const SCENES: [&str; 2] = ["powerplant", "bunnies"];
@@ -116,7 +116,7 @@ pub(super) fn compare(
     for case in &cases {
         plan.args = &case.args;
         let finished = plan.run_after(&case.named, &bar, streams, &mut |world, streams| {
-            let state = crate::run::FrameState::at(world, world.scene.frames / 2);
+            let state = FrameState::at(world, Moment { frame: world.scene.frames / 2, view: 0 });
             let complexity = depth_complexity(world, &state);
             let line = format!(
                 "{}: {} objects, {} moving, {} triangles, {} after the cut, {} parts (at most {} triangles each), {} frames; depth complexity {complexity:.1} in the middle frame; {} in {:.1} s{}",

@@ -11,7 +11,7 @@ use super::{CliError, EXIT_HELD, OutFile, Streams};
 use crate::cull::CullerKind;
 use crate::part::PartId;
 use crate::report::{Shown, depth_picture, part_picture, picture_png, top_view};
-use crate::run::{FrameState, Truth, render};
+use crate::run::{FrameState, Moment, Truth, render};
 
 /// Pixels along a side of the view from above.
 const TOP_VIEW_SIDE: u32 = 1024;
@@ -45,11 +45,17 @@ pub(super) fn picture(
     let world = named.world(&scene_args, plan.cache.as_ref(), &bar, streams);
     bar.finish_and_clear();
     let world = world?;
-    let state = FrameState::at(&world, args.frame);
+    let moment = Moment { frame: args.frame, view: args.view };
+    if moment.view >= world.views() {
+        let (view, views) = (moment.view, world.views());
+        let what = format!("--view {view}: {} has {views} views, counted from 0", args.scene);
+        return Err(CliError::Usage(what));
+    }
+    let state = FrameState::at(&world, moment);
     let truth = Truth::of(&world, &state);
     let drawn: Vec<PartId> = if needs_culler {
         let bar = progress_bar();
-        let drawn = plan.drawn_in(&world, args.frame, &bar);
+        let drawn = plan.drawn_in(&world, moment, &bar);
         bar.finish_and_clear();
         drawn?
     } else {

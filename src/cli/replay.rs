@@ -50,7 +50,8 @@ pub(super) fn replay(
 fn json_line(frame: &FrameTrace) -> String {
     let mut line = json!({
         "schema": JSON_SCHEMA,
-        "frame": frame.frame,
+        "frame": frame.moment.frame,
+        "view": frame.moment.view,
         "drawn_parts": frame.drawn_parts,
         "visible_parts": frame.visible_parts,
         "queries": frame.counts.queries,
@@ -70,8 +71,8 @@ fn json_line(frame: &FrameTrace) -> String {
 fn text_line(frame: &FrameTrace) -> String {
     let memory = MemoryFigures::of(std::slice::from_ref(frame));
     format!(
-        "frame {:>4}: drew {:>5}, visible {:>5}, {:>5} queries, {:>4} trips, {:>7.1} ms, events {:016x}{}",
-        frame.frame,
+        "{:<10}: drew {:>5}, visible {:>5}, {:>5} queries, {:>4} trips, {:>7.1} ms, events {:016x}{}",
+        frame.moment.to_string(),
         frame.drawn_parts,
         frame.visible_parts,
         frame.counts.queries,

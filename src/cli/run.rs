@@ -9,14 +9,14 @@ use super::args::{RunArgs, SceneArgs, quoted};
 use super::progress::{counting_triangles, progress_bar};
 use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
 use crate::check::Gate;
-use crate::cull::{Culler, CullerKind, CullerSetup};
+use crate::cull::{Culler, CullerKind, CullerSetup, PerView};
 use crate::index::{Entry, INDEXES, IndexKind};
 use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
 use crate::oracle::{Always, CostModel, HierarchicalZ, Oracle, OracleError, Questions, Sim, Stage};
 use crate::part::{Cache, PartId};
 use crate::report::{Row, table};
 use crate::run::{
-    FrameRecord, Lane, LaneInfo, Observer, Repeat, Trace, World, partition_difference,
+    FrameRecord, Lane, LaneInfo, Moment, Observer, Repeat, Trace, World, partition_difference,
     run as run_lanes,
 };
 use crate::scene::{Scene, generate};
@@ -216,12 +216,14 @@ pub(super) struct Finished {
     pub(super) gates: Vec<Gate>,
 }
 
-/// Keeps what was drawn in the latest frame.
-struct LastDrawn(Vec<PartId>);
+/// Keeps what was drawn at one moment.
+struct DrawnAt(Moment, Vec<PartId>);
 
-impl Observer for LastDrawn {
+impl Observer for DrawnAt {
     fn frame(&mut self, record: &FrameRecord<'_>) {
-        self.0 = record.drawn.to_vec();
+        if record.state.moment == self.0 {
+            self.1 = record.drawn.to_vec();
+        }
     }
 }
 
@@ -282,7 +284,7 @@ impl Plan<'_> {
             .flat_map(|oracle| self.cullers.iter().map(move |&culler| (oracle.as_str(), culler)))
             .collect();
         gates.resize_with(lanes.len(), Gate::default);
-        let shots = u64::from(frames) + self.repeat.total(frames);
+        let shots = (u64::from(frames) + self.repeat.total(frames)) * u64::from(world.views());
         bar.inc_length(shots * lanes.len() as u64);
         let mut running: Vec<Lane<'_>> = Vec::new();
         for (&(oracle, kind), gate) in lanes.iter().zip(&mut gates) {
@@ -304,28 +306,29 @@ impl Plan<'_> {
         Ok(Finished { world, traces, gates })
     }
 
-    /// What the first lane draws in frame `last`, after all frames before it.
+    /// What the first lane draws at that moment, after all frames before it.
     pub(super) fn drawn_in(
         &self,
         world: &World,
-        last: u32,
+        moment: Moment,
         bar: &ProgressBar,
     ) -> Result<Vec<PartId>, CliError> {
         let stage = world.stage();
         let staged = self.oracles.stage(&stage)?;
         let entries = world.entries();
-        let mut seen = LastDrawn(Vec::new());
+        let mut seen = DrawnAt(moment, Vec::new());
         let oracle = staged.make(&staged.names[0])?;
         let info = LaneInfo::of(self.cullers[0].name, oracle.as_ref(), String::new());
         let culler = self.factory(self.cullers[0], world, &entries);
         let lane = Lane { info, culler, oracle, observer: &mut seen, with_bound: false };
-        bar.inc_length(u64::from(last) + 1);
+        let frames = moment.frame + 1;
+        bar.inc_length(u64::from(frames) * u64::from(world.views()));
         let mut tick = || {
             bar.inc(1);
             !INTERRUPTED.load(Ordering::Relaxed)
         };
-        run_lanes(world, last + 1, Repeat::NONE, &mut [lane], &mut tick)?;
-        Ok(seen.0)
+        run_lanes(world, frames, Repeat::NONE, &mut [lane], &mut tick)?;
+        Ok(seen.1)
     }
 
     fn factory<'a>(
@@ -335,11 +338,13 @@ impl Plan<'_> {
         entries: &'a [Entry],
     ) -> Box<dyn Fn() -> Box<dyn Culler> + 'a> {
         Box::new(move || {
-            (kind.make)(CullerSetup {
-                partition: world.partition.clone(),
-                index: (self.index.build)(entries),
-                proxy: self.args.proxy.into(),
-                cost: self.cost.clone(),
+            PerView::over(world.views(), || {
+                (kind.make)(CullerSetup {
+                    partition: world.partition.clone(),
+                    index: (self.index.build)(entries),
+                    proxy: self.args.proxy.into(),
+                    cost: self.cost.clone(),
+                })
             })
         })
     }
@@ -439,10 +444,11 @@ fn tell_table(rows: &[Row], cut: bool, streams: &mut Streams<'_>) -> Result<(), 
             said.push(&row.scene);
             writeln!(
                 streams.out,
-                "{}: seed {}, {} frames, {} objects, {} triangles cut into {} in {} parts ({} pixels differ from the uncut scene)",
+                "{}: seed {}, {} frames{}, {} objects, {} triangles cut into {} in {} parts ({} pixels differ from the uncut scene)",
                 row.scene,
                 row.seed,
                 row.frames,
+                if row.views > 1 { format!(" of {} views", row.views) } else { String::new() },
                 row.objects,
                 row.triangles,
                 row.fragments,

@@ -1,4 +1,4 @@
-//! What a culler sees of one frame.
+//! What a culler sees of one view of a frame.
 
 use glam::{DMat4, DVec3};
 
@@ -20,11 +20,13 @@ pub struct ObjectView {
     pub error: ClipError,
 }
 
-/// One frame as a culler sees it. Coordinates are f64, right-handed, y up.
+/// One view of a frame as a culler sees it. Coordinates are f64, right-handed, y up.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     /// Frame number, from 0.
     pub frame: u32,
+    /// Which of the frame's views, from 0; see [`PerView`](super::PerView).
+    pub view: u32,
     /// Pixels.
     pub viewport: Viewport,
     /// The camera in the world.

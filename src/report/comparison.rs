@@ -299,7 +299,7 @@ impl Comparison<'_> {
                     "{},{},{},{:.3},{:.3},{},{},{},{},{},{},{},{}{}\n",
                     self.label,
                     trace.lane.culler,
-                    f.frame,
+                    f.moment.frame,
                     wall_ms(f),
                     self.model.frame_total_ns(f.amounts()) as f64 / 1e6,
                     f.drawn_parts,
@@ -320,7 +320,8 @@ impl Comparison<'_> {
 
 /// The largest ratio of a figure to that of the same frame of `base`, and the frame.
 fn worst_frame(trace: &Trace, base: &Trace, figure: impl Fn(&FrameTrace) -> f64) -> (f64, u32) {
-    let ratio = |(a, b): (&FrameTrace, &FrameTrace)| (figure(a) / figure(b).max(1e-9), a.frame);
+    let ratio =
+        |(a, b): (&FrameTrace, &FrameTrace)| (figure(a) / figure(b).max(1e-9), a.moment.frame);
     trace
         .frames
         .iter()

@@ -21,6 +21,8 @@ pub struct Row {
     pub seed: u64,
     /// Frames run.
     pub frames: u32,
+    /// Views of each frame, each drawn and judged by itself.
+    pub views: u32,
     /// The culler's name.
     pub culler: String,
     /// The oracle's name.
@@ -83,7 +85,8 @@ impl Row {
             schema: JSON_SCHEMA,
             scene: world.scene.name.clone(),
             seed: world.scene.seed,
-            frames: trace.frames.len() as u32,
+            frames: trace.frames.len() as u32 / world.views(),
+            views: world.views(),
             culler: trace.lane.culler.clone(),
             oracle: trace.lane.oracle.to_owned(),
             device: trace.lane.device.clone(),
@@ -108,8 +111,14 @@ impl Row {
         }
     }
 
+    /// Views of all frames.
+    fn shots(&self) -> u32 {
+        self.frames * self.views
+    }
+
     fn cells(&self) -> [String; 9] {
-        let per_frame = |sum: u64| format!("{:.1}", sum as f64 / f64::from(self.frames.max(1)));
+        let shots = f64::from(self.shots().max(1));
+        let per_frame = |sum: u64| format!("{:.1}", sum as f64 / shots);
         [
             self.scene.clone(),
             self.culler.clone(),
@@ -118,7 +127,7 @@ impl Row {
             per_frame(self.visible_parts),
             per_frame(self.queries),
             per_frame(self.round_trips),
-            format!("{:.1}", self.wall_ms / f64::from(self.frames.max(1))),
+            format!("{:.1}", self.wall_ms / shots),
             self.verdict.to_owned(),
         ]
     }
@@ -149,7 +158,7 @@ pub fn table(rows: &[Row]) -> String {
     }
     let memory = |row: &Row| {
         let name = format!("{} {} {}", row.scene, row.culler, row.oracle);
-        (name, row.frames as usize, row.memory)
+        (name, row.shots() as usize, row.memory)
     };
     text + &memory_table(&rows.iter().map(memory).collect::<Vec<_>>())
 }

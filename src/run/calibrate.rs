@@ -13,7 +13,7 @@
 
 use std::time::Instant;
 
-use super::{FrameState, RunError, World};
+use super::{FrameState, Moment, RunError, World};
 use crate::cull::{Culler, CullerSetup, Pen, ProxyKind, ViewFrustum};
 use crate::index::INDEXES;
 use crate::oracle::{
@@ -143,7 +143,7 @@ fn parts_in_view(world: &World) -> Vec<(u32, Vec<PartId>)> {
     let mut views = Vec::new();
     // An index follows the objects, so it sees the frames between as well.
     for t in 0..=chosen[chosen.len() - 1] {
-        let state = FrameState::at(world, t);
+        let state = FrameState::at(world, Moment { frame: t, view: 0 });
         let mut pen = Pen::new(&mut oracle, &world.partition);
         let drawn = culler.frame(&state.view(world), &mut pen).and_then(|()| pen.finish());
         let (parts, ..) = drawn.expect("this oracle never fails");
@@ -279,7 +279,7 @@ pub fn measure(
     let states: Vec<Vec<FrameState>> = benches.iter().map(states).collect();
     let mut run = |bench: &mut Bench<'_>, states: &[FrameState], work: usize| {
         let Bench { world, oracle, works } = bench;
-        let state = states.iter().find(|state| state.frame == works[work].frame);
+        let state = states.iter().find(|state| state.moment.frame == works[work].frame);
         let state = state.expect("each frame has its state");
         let measured = run_once(world, oracle.as_mut(), state, &works[work])?;
         if tick() { Ok(measured) } else { Err(RunError::Interrupted) }
@@ -311,7 +311,7 @@ fn states(bench: &Bench<'_>) -> Vec<FrameState> {
     let mut frames: Vec<u32> = bench.works.iter().map(|work| work.frame).collect();
     frames.sort_unstable();
     frames.dedup();
-    frames.into_iter().map(|t| FrameState::at(bench.world, t)).collect()
+    frames.into_iter().map(|t| FrameState::at(bench.world, Moment { frame: t, view: 0 })).collect()
 }
 
 /// One frame, timed as a lane's frame is: through a pen, up to the end of its last batch.
@@ -323,7 +323,8 @@ fn run_once(
 ) -> Result<Measurement, OracleError> {
     let mut answers: Vec<Answer> = Vec::new();
     let start = Instant::now();
-    oracle.begin_frame(&FrameView { frame: state.frame, clip_from_object: &state.matrices })?;
+    oracle
+        .begin_frame(&FrameView { frame: state.moment.frame, clip_from_object: &state.matrices })?;
     let mut pen = Pen::new(oracle, &world.partition);
     for step in &workload.steps {
         match step {

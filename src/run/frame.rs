@@ -6,6 +6,7 @@ use std::time::Instant;
 use glam::{DMat4, DVec3};
 use plainsight_reference::fast::Options;
 
+use super::Moment;
 use crate::cull::{ObjectView, View};
 use crate::effect;
 use crate::index::{Entry, Move};
@@ -75,6 +76,12 @@ impl World {
         Ok(Self { memory: Some(memory), ..self })
     }
 
+    /// How many views each frame has.
+    #[must_use]
+    pub fn views(&self) -> u32 {
+        self.scene.cameras.len() as u32
+    }
+
     /// How many objects some effect moves.
     #[must_use]
     pub fn moving_count(&self) -> usize {
@@ -91,7 +98,7 @@ impl World {
     /// What an index is built from: the boxes of frame 0.
     #[must_use]
     pub fn entries(&self) -> Vec<Entry> {
-        let state = FrameState::at(self, 0);
+        let state = FrameState::first(self);
         let bound = |object: usize| self.effects.step_bound(object as u32);
         let entry = |(object, view): (usize, &ObjectView)| Entry {
             bounds: view.bounds,
@@ -101,10 +108,11 @@ impl World {
     }
 }
 
-/// Everything about one frame that does not depend on a culler; a pure function of (scene, t).
+/// Everything about one view of a frame that does not depend on a culler; a pure function of
+/// (scene, t, view).
 pub struct FrameState {
-    /// t.
-    pub frame: u32,
+    /// Which frame and view.
+    pub moment: Moment,
     /// The camera.
     pub camera: Camera,
     /// Clip from world.
@@ -118,10 +126,14 @@ pub struct FrameState {
 }
 
 impl FrameState {
-    /// The state of `world` at frame `t`.
+    /// The state of `world` at that frame, seen by that camera.
+    ///
+    /// # Panics
+    /// For a view that the scene does not have.
     #[must_use]
-    pub fn at(world: &World, t: u32) -> Self {
-        let camera = world.scene.camera.at(t);
+    pub fn at(world: &World, moment: Moment) -> Self {
+        let t = moment.frame;
+        let camera = world.scene.cameras[moment.view as usize].at(t);
         let clip_from_world = camera.clip_from_world(world.scene.viewport);
         let objects: Vec<ObjectView> = (0..world.scene.objects.len() as u32)
             .map(|object| {
@@ -144,14 +156,21 @@ impl FrameState {
         let moves =
             if t == 0 { Vec::new() } else { world.effects.moving().iter().map(moved).collect() };
         let matrices = objects.iter().map(|o| rounded_clip_matrix(&o.clip_from_object)).collect();
-        Self { frame: t, camera, clip_from_world, objects, matrices, moves }
+        Self { moment, camera, clip_from_world, objects, matrices, moves }
+    }
+
+    /// The first view of frame 0.
+    #[must_use]
+    pub fn first(world: &World) -> Self {
+        Self::at(world, Moment { frame: 0, view: 0 })
     }
 
     /// As a culler sees it.
     #[must_use]
     pub fn view<'a>(&'a self, world: &'a World) -> View<'a> {
         View {
-            frame: self.frame,
+            frame: self.moment.frame,
+            view: self.moment.view,
             viewport: world.scene.viewport,
             camera: self.camera,
             clip_from_world: self.clip_from_world,

@@ -7,7 +7,8 @@ use std::time::Instant;
 use plainsight_reference::Tolerance;
 
 use super::{
-    DeviceImages, FrameRecord, FrameState, FrameTrace, HASH_START, Trace, Truth, World, fold,
+    DeviceImages, FrameRecord, FrameState, FrameTrace, HASH_START, Moment, Trace, Truth, World,
+    fold,
 };
 use crate::cull::{Counts, Culler, Pen};
 use crate::oracle::{FrameView, Oracle, OracleError, ReadBack};
@@ -57,7 +58,8 @@ pub trait Observer {
 pub struct Lane<'a> {
     /// Names.
     pub info: LaneInfo,
-    /// Makes the culler; called once for the run and once for the repetition.
+    /// Makes the culler; called once for the run and once for the repetition. Where frames have several
+    /// views it is asked for each of them; see [`PerView`](crate::cull::PerView).
     pub culler: Box<dyn Fn() -> Box<dyn Culler> + 'a>,
     /// The oracle.
     pub oracle: Box<dyn Oracle + 'a>,
@@ -114,8 +116,9 @@ struct Shot {
     own: Option<ReadBack>,
 }
 
-/// Runs every lane over frames `0..frames`, the lanes in turn within each frame, then what `repeat`
-/// says, again in turn. `tick` is called after each lane's frame and stops the run by returning false.
+/// Runs every lane over frames `0..frames`, each view by itself, the lanes in turn within each view, then
+/// what `repeat` says, again in turn. `tick` is called after each lane's view and stops the run by
+/// returning false.
 ///
 /// # Errors
 /// [`RunError::Oracle`] where an oracle gives up, [`RunError::Interrupted`] where `tick` says so.
@@ -132,8 +135,8 @@ pub fn run(
     let traces = |lane: &Lane<'_>| Trace { lane: lane.info.clone(), frames: Vec::new() };
     let mut traces: Vec<Trace> = lanes.iter().map(traces).collect();
     let mut cullers: Vec<_> = lanes.iter().map(|lane| (lane.culler)()).collect();
-    for t in 0..frames {
-        let state = FrameState::at(world, t);
+    for moment in Moment::all(world, frames) {
+        let state = FrameState::at(world, moment);
         let truth = Truth::of(world, &state);
         let (mut everything, mut bound): (Option<ReadBack>, Option<u64>) = (None, None);
         for ((lane, culler), trace) in lanes.iter_mut().zip(&mut cullers).zip(&mut traces) {
@@ -173,7 +176,7 @@ fn draw_visible(
         .collect();
     visible.sort_by(|a, b| a.0.total_cmp(&b.0));
     let start = Instant::now();
-    oracle.begin_frame(&FrameView { frame: state.frame, clip_from_object: &state.matrices })?;
+    oracle.begin_frame(&frame_view(state))?;
     let mut pen = Pen::new(oracle, &world.partition);
     visible.into_iter().for_each(|(_, part)| pen.draw(part));
     pen.finish()?;
@@ -183,6 +186,11 @@ fn draw_visible(
 /// What a trace keeps of the truth: visible parts, their triangles, the image's hash.
 fn truth_facts(truth: &Truth) -> (u32, u64, u64) {
     (truth.visible_parts, truth.visible_triangles, truth.hash)
+}
+
+/// What an oracle is told of it.
+fn frame_view(state: &FrameState) -> FrameView<'_> {
+    FrameView { frame: state.moment.frame, clip_from_object: &state.matrices }
 }
 
 fn shoot(
@@ -195,7 +203,7 @@ fn shoot(
     let oracle = lane.oracle.as_mut();
     // Wall time is reported and never compared.
     let start = Instant::now();
-    oracle.begin_frame(&FrameView { frame: state.frame, clip_from_object: &state.matrices })?;
+    oracle.begin_frame(&frame_view(state))?;
     let mut pen = Pen::new(oracle, &world.partition);
     culler.frame(&state.view(world), &mut pen)?;
     let (drawn, counts, events_hash) = pen.finish()?;
@@ -203,7 +211,7 @@ fn shoot(
     if cfg!(debug_assertions)
         && let Err(broken) = culler.check()
     {
-        panic!("{} broke its invariants in frame {}: {broken}", culler.name(), state.frame);
+        panic!("{} broke its invariants in {}: {broken}", culler.name(), state.moment);
     }
     let memory = oracle.memory();
     let own = oracle.read_back()?;
@@ -213,7 +221,7 @@ fn shoot(
     let image_hash = own.as_ref().map_or(0, words);
     let drawn_parts = drawn.len() as u32;
     let trace = FrameTrace {
-        frame: state.frame,
+        moment: state.moment,
         drawn_parts,
         visible_parts,
         visible_triangles,
@@ -259,19 +267,19 @@ fn run_again(
     traces: &mut [Trace],
     tick: &mut dyn FnMut() -> bool,
 ) -> Result<(), RunError> {
-    let frames = traces.iter().map(|trace| trace.frames.len() as u32).max().unwrap_or(0);
-    let frames = repeat.frames.min(frames);
+    let run = traces.iter().map(|trace| trace.frames.len() as u32).max().unwrap_or(0);
+    let frames = repeat.frames.min(run / world.views());
     let walls_of = |trace: &Trace| trace.frames.iter().map(|frame| vec![frame.wall_ns]).collect();
     let mut walls: Vec<Vec<Vec<u64>>> = traces.iter().map(walls_of).collect();
     for _ in 0..repeat.rounds {
         let mut cullers: Vec<_> = lanes.iter().map(|lane| (lane.culler)()).collect();
-        for t in 0..frames {
-            let state = FrameState::at(world, t);
+        for (shot, moment) in Moment::all(world, frames).enumerate() {
+            let state = FrameState::at(world, moment);
             for (place, (lane, culler)) in lanes.iter_mut().zip(&mut cullers).enumerate() {
-                let first = &traces[place].frames[t as usize];
+                let first = &traces[place].frames[shot];
                 let facts = (first.visible_parts, first.visible_triangles, first.truth_hash);
                 let again = shoot(world, &state, facts, lane, culler.as_mut())?;
-                walls[place][t as usize].push(again.trace.wall_ns);
+                walls[place][shot].push(again.trace.wall_ns);
                 lane.observer.repeated(first, &again.trace);
                 if !tick() {
                     return Err(RunError::Interrupted);

@@ -11,7 +11,7 @@ mod truth;
 pub use calibrate::{Bench, CalibrationKnobs, Workload, frames_to_measure, measure, workloads};
 pub use frame::{FrameState, World};
 pub use lane::{Lane, LaneInfo, Observer, Repeat, RunError, run};
-pub use trace::{DeviceImages, FrameRecord, FrameTrace, Trace};
+pub use trace::{DeviceImages, FrameRecord, FrameTrace, Moment, Trace};
 pub use truth::{Truth, depth_complexity, fates_of_parts, partition_difference, render};
 
 /// FNV-1a over whole words with a rotation, the hash of everything a trace compares.

@@ -1,6 +1,7 @@
 //! The record of a run, and what observers are shown of each frame.
 
 use std::cell::OnceCell;
+use std::fmt;
 
 use plainsight_reference::Fates;
 
@@ -8,6 +9,30 @@ use super::{FrameState, HASH_START, LaneInfo, Truth, World, fates_of_parts, fold
 use crate::cull::Counts;
 use crate::oracle::{Amounts, Memory, ReadBack};
 use crate::part::PartId;
+
+/// Which view of which frame; reads "frame 3", or "frame 3 view 1" where it is not the first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Moment {
+    /// t.
+    pub frame: u32,
+    /// The number of the camera.
+    pub view: u32,
+}
+
+impl Moment {
+    /// Every view of the first `frames` frames, in the order of a run.
+    pub fn all(world: &World, frames: u32) -> impl Iterator<Item = Self> + use<> {
+        let views = world.views();
+        (0..frames).flat_map(move |frame| (0..views).map(move |view| Self { frame, view }))
+    }
+}
+
+impl fmt::Display for Moment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { frame, view } = self;
+        if *view == 0 { write!(f, "frame {frame}") } else { write!(f, "frame {frame} view {view}") }
+    }
+}
 
 /// What a real device drew in one frame.
 pub struct DeviceImages<'a> {
@@ -17,7 +42,7 @@ pub struct DeviceImages<'a> {
     pub all: &'a ReadBack,
 }
 
-/// One finished frame of one lane, lent to the observers.
+/// One finished view of a frame of one lane, lent to the observers.
 pub struct FrameRecord<'a> {
     /// Which lane.
     pub lane: &'a LaneInfo,
@@ -45,11 +70,11 @@ impl FrameRecord<'_> {
     }
 }
 
-/// What is kept of one frame.
+/// What is kept of one view of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameTrace {
-    /// t.
-    pub frame: u32,
+    /// Which frame and view.
+    pub moment: Moment,
     /// Parts drawn.
     pub drawn_parts: u32,
     /// Parts the truth shows.
@@ -78,7 +103,7 @@ pub struct FrameTrace {
 pub struct Trace {
     /// Which lane.
     pub lane: LaneInfo,
-    /// Frame by frame.
+    /// Frame by frame, and view by view within a frame.
     pub frames: Vec<FrameTrace>,
 }
 
@@ -108,7 +133,7 @@ impl FrameTrace {
     pub fn fold_into(&self, hash: u64) -> u64 {
         let memory = self.memory.iter().flat_map(Memory::words);
         [
-            u64::from(self.frame),
+            u64::from(self.moment.view) << 32 | u64::from(self.moment.frame),
             u64::from(self.drawn_parts),
             self.counts.queries,
             self.counts.visible_answers,

@@ -96,7 +96,7 @@ pub fn partition_difference(world: &World) -> u64 {
     let knobs = PartitionKnobs { leaf_triangles: u32::MAX, ..PartitionKnobs::default() };
     let uncut = World::new((*world.scene).clone(), knobs).rendered(world.render);
     let sources = |world: &World| {
-        let truth = Truth::of(world, &FrameState::at(world, 0));
+        let truth = Truth::of(world, &FrameState::first(world));
         let source = |draw| world.partition.source_of_draw(draw);
         truth.image.draw_indices().map(|draw| draw.map(source)).collect::<Vec<_>>()
     };

@@ -29,6 +29,11 @@
 //! shift = [0.5,0]                          # how far the view direction is off the middle
 //! near = 0.1
 //! far = inf                                # or a number
+//! [[views]]                                # more views of every frame, with the keys of camera_path
+//! poses = [{ eye = [1,0,5], target = [1,0,0] }]
+//! fov_y_degrees = 60
+//! near = 0.1
+//! far = 10
 //! ```
 
 use std::path::{Path, PathBuf};
@@ -64,6 +69,8 @@ struct SceneFile {
     #[serde(default)]
     objects: Vec<InlineObject>,
     camera_path: Option<InlinePath>,
+    #[serde(default)]
+    views: Vec<InlinePath>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -203,6 +210,10 @@ fn one_line(text: &str, error: &toml::de::Error) -> String {
 fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
     let chosen = knobs.chosen(&generate::USUAL).map_err(|error| error.to_string())?;
     let path = file.camera_path.ok_or("inline objects need a [camera_path]")?;
+    let mut cameras = vec![camera("camera_path", &path, chosen.frames)?];
+    for (number, path) in (1..).zip(&file.views) {
+        cameras.push(camera(&format!("view {number}"), path, chosen.frames)?);
+    }
     let (mut meshes, mut objects) = (Vec::new(), Vec::new());
     let (mut movers, mut jumpers) = (Vec::new(), Vec::new());
     for (number, object) in file.objects.into_iter().enumerate() {
@@ -244,7 +255,7 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
         seed: chosen.seed,
         meshes,
         objects,
-        camera: camera(&path, chosen.frames)?,
+        cameras,
         viewport: chosen.viewport,
         leaf_triangles: file.leaf_triangles.unwrap_or(chosen.leaf_triangles),
         frames: chosen.frames,
@@ -255,7 +266,8 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
     })
 }
 
-fn camera(path: &InlinePath, duration: u32) -> Result<CameraPath, String> {
+/// The path; `place` is what the user calls it.
+fn camera(place: &str, path: &InlinePath, duration: u32) -> Result<CameraPath, String> {
     let pose = |pose: &InlinePose| {
         let (eye, target) = (DVec3::from(pose.eye), DVec3::from(pose.target));
         let seen = eye.is_finite() && target.is_finite() && eye != target;
@@ -264,31 +276,29 @@ fn camera(path: &InlinePath, duration: u32) -> Result<CameraPath, String> {
     let poses: Option<Vec<CameraPose>> = path.poses.iter().map(pose).collect();
     let poses = poses
         .filter(|poses| !poses.is_empty())
-        .ok_or("camera_path: needs poses whose eye and target are finite and differ")?;
+        .ok_or(format!("{place}: needs poses whose eye and target are finite and differ"))?;
     let lens = match (path.fov_y_degrees, path.orthographic_height) {
         (Some(degrees), None) if degrees > 0.0 && degrees < 180.0 => {
             Lens::Perspective { fov_y: degrees.to_radians(), shift: path.shift }
         }
         (Some(_), None) => {
-            return Err("camera_path: fov_y_degrees must be above 0 and below 180".to_owned());
+            return Err(format!("{place}: fov_y_degrees must be above 0 and below 180"));
         }
         (None, Some(height)) if height > 0.0 && height.is_finite() => Lens::Orthographic { height },
         (None, Some(_)) => {
-            return Err("camera_path: orthographic_height must be above 0 and finite".to_owned());
+            return Err(format!("{place}: orthographic_height must be above 0 and finite"));
         }
         _ => {
-            let what = "camera_path: needs one of fov_y_degrees and orthographic_height";
-            return Err(what.to_owned());
+            return Err(format!("{place}: needs one of fov_y_degrees and orthographic_height"));
         }
     };
     if !path.shift.iter().all(|share| share.is_finite()) {
-        return Err("camera_path: shift must be finite".to_owned());
+        return Err(format!("{place}: shift must be finite"));
     }
     let endless = path.far == f64::INFINITY && matches!(lens, Lens::Perspective { .. });
     if !(path.near > 0.0 && path.far > path.near && (path.far.is_finite() || endless)) {
-        return Err(
-            "camera_path: needs 0 < near < far; with fov_y_degrees far may be inf".to_owned()
-        );
+        let what = "needs 0 < near < far; with fov_y_degrees far may be inf";
+        return Err(format!("{place}: {what}"));
     }
     let travel = match path.travel {
         TravelName::Glide => Travel::Glide,
@@ -319,6 +329,18 @@ mod tests {
         assert_eq!(read(INLINE).unwrap().triangle_count(), 1);
     }
 
+    fn two_views() -> String {
+        let view = "poses = [{ eye = [1,0,5], target = [0,0,0] }]\nfov_y_degrees = 9\nnear = 2\nfar = 10\n";
+        format!("{INLINE}[[views]]\n{view}")
+    }
+
+    #[test]
+    fn a_frame_may_have_several_views() {
+        let cameras = read(&two_views()).unwrap().cameras;
+        let nears: Vec<f64> = cameras.iter().map(|camera| camera.near).collect();
+        assert_eq!(nears, [0.1, 2.0]);
+    }
+
     #[test]
     fn refusals_are_one_line_and_name_the_place() {
         for (text, says) in [
@@ -338,6 +360,7 @@ mod tests {
             ),
             (&INLINE.replace("target = [0,0,0]", "target = [0,0,5]"), "finite and differ"),
             (&INLINE.replace("[1,0,0]", "[nan,0,0]"), "not finite"),
+            (&two_views().replace("near = 2", "near = 20"), "view 1: needs 0 < near < far"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.contains(says) && !error.contains('\n'), "{text:?} said {error}");

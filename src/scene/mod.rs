@@ -198,8 +198,9 @@ pub struct Scene {
     pub meshes: Vec<Arc<Mesh>>,
     /// Objects, at most 2³² of them; the place in this list is the object's id.
     pub objects: Vec<Object>,
-    /// The camera at every t.
-    pub camera: CameraPath,
+    /// The cameras of every frame, at least one: each is a *view* of the same moment, as the two eyes of a
+    /// headset or two players at one screen, drawn and judged by itself.
+    pub cameras: Vec<CameraPath>,
     /// Pixels.
     pub viewport: Viewport,
     /// How many frames a run has by default.

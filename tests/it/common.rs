@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use plainsight::check::Gate;
-use plainsight::cull::{CullerKind, CullerSetup, ProxyKind};
+use plainsight::cull::{CullerKind, CullerSetup, PerView, ProxyKind};
 use plainsight::index::IndexKind;
 use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware};
 use plainsight::oracle::{Always, CostModel, HierarchicalZ, Oracle, Questions, Sim};
@@ -79,11 +79,13 @@ pub(crate) fn gates(
             _ => oracle(oracle_name, world),
         };
         let make = || {
-            (culler.make)(CullerSetup {
-                partition: world.partition.clone(),
-                index: (index.build)(&entries),
-                proxy,
-                cost: CostModel::lavapipe(),
+            PerView::over(world.views(), || {
+                (culler.make)(CullerSetup {
+                    partition: world.partition.clone(),
+                    index: (index.build)(&entries),
+                    proxy,
+                    cost: CostModel::lavapipe(),
+                })
             })
         };
         let replay = format!("scene {} seed {}", world.scene.name, world.scene.seed);

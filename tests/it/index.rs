@@ -6,7 +6,7 @@ use plainsight::index::{Entry, INDEXES, Index, Move, NodeId};
 use plainsight::math::Aabb;
 use plainsight::oracle::CostModel;
 use plainsight::part::ObjectId;
-use plainsight::run::FrameState;
+use plainsight::run::{FrameState, Moment};
 use plainsight::scene::Stream;
 
 use crate::common::world;
@@ -120,7 +120,7 @@ fn rebuilt_nodes_inherit_what_was_visible() {
     let mut visible_after: Vec<u32> = Vec::new();
     let (mut inherited, mut forgotten) = (0, 0);
     for t in 0..40 {
-        let state = FrameState::at(&world, t);
+        let state = FrameState::at(&world, Moment { frame: t, view: 0 });
         scenery.begin_frame(&state.view(&world), &mut visible_after);
         beside.update(&state.moves);
         let of = |item| visible_after[scenery.slot(item)];

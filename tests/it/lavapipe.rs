@@ -121,7 +121,7 @@ fn ids_and_depth_of_whole_scenes() {
     let mut lines = Vec::new();
     for scene in crate::common::SCENES {
         let world = world(scene, 1, 0.05, 1);
-        let state = FrameState::at(&world, 0);
+        let state = FrameState::first(&world);
         let truth = Truth::of(&world, &state);
         let mut device = crate::common::oracle("hardware", &world);
         device.begin_frame(&FrameView { frame: 0, clip_from_object: &state.matrices }).unwrap();

@@ -376,7 +376,7 @@ fn culler(name: &str) -> CullerKind {
 /// What a frame's culler did and left, without its memory.
 fn deeds(trace: &Trace) -> Vec<[u64; 5]> {
     let of = |f: &FrameTrace| {
-        [f.frame.into(), f.drawn_parts.into(), f.events_hash, f.image_hash, f.truth_hash]
+        [f.moment.frame.into(), f.drawn_parts.into(), f.events_hash, f.image_hash, f.truth_hash]
     };
     trace.frames.iter().map(of).collect()
 }

@@ -151,7 +151,7 @@ fn several_proxies_make_one_question() {
 #[test]
 fn maxima_answer_as_queries_do() {
     let world = crate::common::world("rooms", 3, 0.02, 1);
-    let state = plainsight::run::FrameState::at(&world, 0);
+    let state = plainsight::run::FrameState::first(&world);
     let mut answers = Vec::new();
     for name in ["sim", "hardware", "pyramid", "read-back"] {
         let mut oracle = crate::common::oracle(name, &world);

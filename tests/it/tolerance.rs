@@ -5,7 +5,9 @@ use plainsight::check::Gate;
 use plainsight::cull::{Culler, Pen, View};
 use plainsight::oracle::{FrameView, OracleError};
 use plainsight::part::{PartId, PartitionKnobs};
-use plainsight::run::{FrameState, Lane, LaneInfo, Repeat, Truth, World, fates_of_parts, run};
+use plainsight::run::{
+    FrameState, Lane, LaneInfo, Moment, Repeat, Truth, World, fates_of_parts, run,
+};
 use plainsight::scene::generate::{HARD, Knobs, build};
 use plainsight_reference::{Fate, Tolerance};
 
@@ -33,7 +35,7 @@ fn the_device_keeps_to_its_tolerance() {
         let mut device = oracle("hardware", &world);
         let [mut visible, mut must, mut may, mut ties] = [0_usize; 4];
         for frame in [0, 3, 7] {
-            let state = FrameState::at(&world, frame);
+            let state = FrameState::at(&world, Moment { frame, view: 0 });
             let truth = Truth::of(&world, &state);
             device.begin_frame(&FrameView { frame, clip_from_object: &state.matrices }).unwrap();
             let parts: Vec<PartId> = (0..world.partition.part_count()).map(PartId).collect();
@@ -95,7 +97,7 @@ fn only_what_need_not_show_is_forgiven() {
     let knobs =
         PartitionKnobs { leaf_triangles: scene.leaf_triangles, ..PartitionKnobs::default() };
     let world = World::new(scene, knobs);
-    let state = FrameState::at(&world, 0);
+    let state = FrameState::first(&world);
     let (truth, fates) =
         (Truth::of(&world, &state), fates_of_parts(&world, &state, gpu().tolerance()));
     let part = |wanted: Fate| {

@@ -74,14 +74,14 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         seed: chosen.seed,
         meshes,
         objects,
-        camera: CameraPath {
+        cameras: vec![CameraPath {
             poses,
             duration: chosen.frames,
             travel: Travel::Glide,
             lens: Lens::perspective(1.0),
             near: 0.1,
             far: 8.0 * side + 20.0,
-        },
+        }],
         viewport: chosen.viewport,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,

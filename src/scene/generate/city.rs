@@ -62,7 +62,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         seed: chosen.seed,
         meshes,
         objects,
-        camera: drive(chosen, blocks),
+        cameras: vec![drive(chosen, blocks)],
         viewport: chosen.viewport,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,

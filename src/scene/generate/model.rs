@@ -35,7 +35,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         seed: chosen.seed,
         meshes: meshes.into_iter().map(Arc::new).collect(),
         objects,
-        camera: camera(chosen, &bounds),
+        cameras: vec![camera(chosen, &bounds)],
         viewport: chosen.viewport,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,

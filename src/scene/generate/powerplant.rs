@@ -169,7 +169,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         seed: chosen.seed,
         meshes: plant.meshes,
         objects: plant.objects,
-        camera: fly_through(row, bays.div_ceil(row), chosen.frames),
+        cameras: vec![fly_through(row, bays.div_ceil(row), chosen.frames)],
         viewport: chosen.viewport,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,

@@ -86,7 +86,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         seed: chosen.seed,
         meshes,
         objects,
-        camera: walk(chosen, rooms),
+        cameras: vec![walk(chosen, rooms)],
         viewport: chosen.viewport,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,

@@ -64,14 +64,14 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         seed: chosen.seed,
         meshes,
         objects,
-        camera: CameraPath {
+        cameras: vec![CameraPath {
             poses,
             duration: chosen.frames,
             travel: Travel::Glide,
             lens: Lens::perspective(1.1),
             near: 0.05,
             far: SPACE * 8.0,
-        },
+        }],
         viewport: chosen.viewport,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,

@@ -330,3 +330,54 @@ fn wide_viewport(chosen: &Chosen) -> Result<Scene, SceneError> {
     // Three degrees high, a hundred and fifty wide.
     Ok(site.finish(chosen, WIDE_VIEWPORT.name, glide(chosen, &poses, 3.0, [0.1, 90.0])))
 }
+
+pub(super) const STEREO: Generator = Generator {
+    name: "hard/stereo",
+    summary: "two eyes: what one of them sees past an edge the other does not",
+    build: stereo,
+    ..SMALL
+};
+
+fn stereo(chosen: &Chosen) -> Result<Scene, SceneError> {
+    let mut site = Site::default();
+    site.crowd(chosen, (DVec3::new(0.0, 0.0, -4.0), DVec3::new(6.0, 4.0, 3.0)), 80, true);
+    // Posts near the eyes hide different things from each.
+    let post = site.mesh(cube(DVec3::new(0.25, 5.0, 0.25), 8));
+    for x in [-1.2, -0.4, 0.4, 1.2] {
+        site.at(post, x, 0.0, 3.0);
+    }
+    // Eyes wide apart look straight ahead; their lenses are shifted so that both see the same scene.
+    let eye = |side: f64| {
+        let poses = [
+            pose([side, 0.0, 8.0], [side, 0.0, 0.0]),
+            pose([side + 1.0, 0.5, 5.0], [side + 1.2, 0.0, 0.0]),
+        ];
+        let lens = Lens::Perspective { fov_y: 60.0_f64.to_radians(), shift: [side * 0.4, 0.0] };
+        CameraPath { lens, ..glide(chosen, &poses, 60.0, [0.1, 30.0]) }
+    };
+    Ok(site.finish_views(chosen, STEREO.name, vec![eye(-0.5), eye(0.5)]))
+}
+
+pub(super) const SPLIT_SCREEN: Generator = Generator {
+    name: "hard/split-screen",
+    summary: "two players back to back: what is hidden from one is before the other",
+    build: split_screen,
+    ..SMALL
+};
+
+fn split_screen(chosen: &Chosen) -> Result<Scene, SceneError> {
+    let mut site = Site::default();
+    for z in [-6.0, 6.0] {
+        site.crowd(chosen, (DVec3::new(0.0, 0.0, z), DVec3::new(5.0, 3.0, 2.5)), 40, true);
+        let screen = site.mesh(wall(5.0, 4.0, 6));
+        site.at(screen, 0.5, 0.0, z * 0.5);
+    }
+    let player = |ahead: f64, fov_y: f64| {
+        let poses = [
+            pose([0.0, 0.0, ahead * 0.5], [0.0, 0.0, ahead * 9.0]),
+            pose([2.0, 0.3, -ahead], [0.0, 0.0, ahead * 9.0]),
+        ];
+        glide(chosen, &poses, fov_y, [0.05, 30.0])
+    };
+    Ok(site.finish_views(chosen, SPLIT_SCREEN.name, vec![player(-1.0, 70.0), player(1.0, 50.0)]))
+}

@@ -46,6 +46,8 @@ pub const HARD: &[Generator] = &[
     camera::ONE_COLUMN,
     camera::ODD_VIEWPORT,
     camera::WIDE_VIEWPORT,
+    camera::STEREO,
+    camera::SPLIT_SCREEN,
     shapes::FLAT,
     shapes::NEEDLES,
     shapes::SPECKS,
@@ -138,13 +140,17 @@ impl Site {
     }
 
     fn finish(self, chosen: &Chosen, name: &str, camera: CameraPath) -> Scene {
+        self.finish_views(chosen, name, vec![camera])
+    }
+
+    fn finish_views(self, chosen: &Chosen, name: &str, cameras: Vec<CameraPath>) -> Scene {
         let Self { meshes, objects, movers, jumpers } = self;
         Scene {
             name: name.to_owned(),
             seed: chosen.seed,
             meshes,
             objects,
-            camera,
+            cameras,
             viewport: chosen.viewport,
             frames: chosen.frames,
             leaf_triangles: chosen.leaf_triangles,
