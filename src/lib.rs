@@ -18,6 +18,7 @@
 //! | [`cull`] | one frame loop per file behind one trait | the truth |
 //! | [`run`] | scene + culler + oracle to a trace, observed frame by frame | the checks |
 //! | [`check`] | observers of a run, one property per file | reports |
+//! | [`fault`] | real bug classes seeded in cullers, oracles, indexes and math; trials of the gate | reports |
 //! | [`report`] | tables and pictures | |
 //! | [`cli`] | verbs; wires checks to runs | |
 //!
@@ -28,6 +29,7 @@ pub mod check;
 pub mod cli;
 pub mod cull;
 pub mod effect;
+pub mod fault;
 pub mod index;
 pub mod math;
 pub mod oracle;

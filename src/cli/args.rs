@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use plainsight_reference::fast::{Options, SimdLevel};
 
+use super::faults::FaultsArgs;
 use crate::cull::ProxyKind;
 use crate::oracle::{MIB, MemoryKnobs};
 use crate::part::{Crossing, PartitionKnobs};
@@ -38,6 +39,8 @@ pub(super) enum Verb {
     Compare(CompareArgs),
     /// Measure what work costs a device and write the file that `--cost` reads.
     Calibrate(CalibrateArgs),
+    /// Put the gate itself on trial: every seeded fault must be caught.
+    Faults(FaultsArgs),
     /// List scenes, cullers, oracles, indexes and devices.
     List,
 }

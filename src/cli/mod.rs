@@ -5,6 +5,7 @@
 mod args;
 mod calibrate;
 mod compare;
+mod faults;
 mod list;
 mod picture;
 mod progress;
@@ -102,6 +103,7 @@ pub fn main(
         args::Verb::Picture(args) => picture::picture(&args, cullers, &mut streams),
         args::Verb::Compare(args) => compare::compare(&args, cullers, &mut streams),
         args::Verb::Calibrate(args) => calibrate::calibrate(&args, &mut streams),
+        args::Verb::Faults(args) => faults::faults(&args, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),
     };
     done.unwrap_or_else(|error| {

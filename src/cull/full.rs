@@ -26,6 +26,8 @@
 //! and a wrong "visible" costs less than a round trip. Objects without a tree are nodes of their own.
 //! It loses against `vfc` where little is hidden (`full-adaptive` does not).
 
+use std::marker::PhantomData;
+
 use super::layers::next_layer;
 use super::opened::{NO_PARENT, OpenedNodes};
 use super::postponement::scatter;
@@ -33,6 +35,23 @@ use super::scenery::{Appearance, NodeHistory};
 use super::{Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, View, group};
 use crate::index::NodeId;
 use crate::oracle::{OracleError, Proxy};
+
+/// The rules of history that can be got wrong, as they are right. [`Sound`] keeps them all; others exist to
+/// see that the bench notices. They are types, so that the culler pays nothing.
+pub trait HistoryRules {
+    /// A part whose question is postponed counts as visible meanwhile.
+    const POSTPONED_SHOWS: bool = true;
+    /// "Hidden" ends a row of "visible" answers.
+    const HIDDEN_ENDS_STREAK: bool = true;
+    /// What a node's old answer was is nothing to the nodes below it.
+    const CHILDREN_STAND_ALONE: bool = true;
+}
+
+/// All rules kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Sound;
+
+impl HistoryRules for Sound {}
 
 /// What can be tuned.
 #[derive(Clone, Debug)]
@@ -169,11 +188,12 @@ impl Frame {
 }
 
 /// The paper's culler.
-pub struct Full {
+pub struct Full<R = Sound> {
     scenery: Scenery,
     knobs: FullKnobs,
     history: Vec<History>,
     frame: Frame,
+    rules: PhantomData<R>,
 }
 
 impl Full {
@@ -183,12 +203,24 @@ impl Full {
     /// If no question may be in flight, or none may stand in one, or a part has no box.
     #[must_use]
     pub fn new(setup: CullerSetup, knobs: FullKnobs) -> Self {
+        Self::by_rules(setup, knobs)
+    }
+}
+
+impl<R: HistoryRules> Full<R> {
+    /// The same by other rules.
+    ///
+    /// # Panics
+    /// As [`Full::new`].
+    #[must_use]
+    pub fn by_rules(setup: CullerSetup, knobs: FullKnobs) -> Self {
         assert!(knobs.most_in_flight > 0, "at least one question must be in flight");
         assert!(knobs.most_together > 0, "a question is about at least one node");
         assert!(knobs.most_boxes > 0, "a part is asked about by at least one box");
         let scenery_knobs = SceneryKnobs { tighten: knobs.tighten, treeless_items: true };
         let scenery = Scenery::new(setup, scenery_knobs);
-        Self { scenery, knobs, history: Vec::new(), frame: Frame::default() }
+        let (history, frame, rules) = (Vec::new(), Frame::default(), PhantomData);
+        Self { scenery, knobs, history, frame, rules }
     }
 
     /// Walks down from what is on the stack; draws what counts as visible, gathers the rest.
@@ -205,16 +237,26 @@ impl Full {
             let history = self.history[self.scenery.slot(item)];
             let visible_last_time = view.frame > 0 && history.visible_after == view.frame;
             if !visible_last_time {
+                if !R::CHILDREN_STAND_ALONE && self.was_hidden(view, parent) {
+                    continue;
+                }
                 let chance = self.chance_hidden(view, item);
                 let candidate = Candidate { item, proxy, depth, parent, chance };
                 self.frame.candidates.push(candidate);
             } else if self.scenery.is_part(item) && view.frame >= history.ask_from {
                 let place = self.open(view, pen, item, parent, false);
                 self.frame.due.push(Due { item, proxy, place });
-            } else {
+            } else if R::POSTPONED_SHOWS || !self.scenery.is_part(item) {
                 self.open(view, pen, item, parent, true);
             }
         }
+    }
+
+    /// Whether the node at that place was found hidden in the frame before; for broken rules.
+    fn was_hidden(&self, view: &View<'_>, place: usize) -> bool {
+        let item = self.frame.opened.iter().nth(place).map(|opened| opened.item);
+        let history = item.map(|item| self.history[self.scenery.slot(item)]);
+        history.is_some_and(|history| view.frame > 0 && history.hidden_after == view.frame)
     }
 
     /// Draws the node's own part or puts its children on the stack. `shows`: whether a part counts as
@@ -259,6 +301,7 @@ impl Full {
         *history = History {
             hidden_after: view.frame + 1,
             hidden_frames: if again { history.hidden_frames + 1 } else { 1 },
+            streak: if R::HIDDEN_ENDS_STREAK { 0 } else { history.streak },
             ..History::default()
         };
     }
@@ -388,7 +431,7 @@ impl Full {
     }
 }
 
-impl Culler for Full {
+impl<R: HistoryRules> Culler for Full<R> {
     fn name(&self) -> &str {
         self.knobs.name
     }

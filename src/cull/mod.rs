@@ -6,7 +6,7 @@ mod adaptive;
 mod chc;
 mod chc_plus;
 mod draw_all;
-mod full;
+pub mod full;
 mod full_waits;
 pub mod group;
 mod layers;

@@ -7,29 +7,79 @@
 //!    Rounding up keeps the last column and row of an odd level.
 //! 2. A rectangle of samples `min` to `max − 1` meets the texels `min >> k` to `(max − 1) >> k`. The level
 //!    is the lowest at which that is at most two along each axis.
-//! 3. Visible if any of them is at or beyond the rectangle's depth.
+//! 3. Visible if any of them is at or beyond the rectangle's depth. At most two along an axis are those of
+//!    the rectangle's corners, so four looks are enough.
 //!
 //! Its depth is the reference's, so what it may add to `sim` is only "visible". It loses where rectangles
 //! are large or straddle texels. A box is no rectangle: it counts as visible unasked.
+
+use std::marker::PhantomData;
 
 use super::batches::Batches;
 use super::{Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Sim, Stage};
 use crate::part::PartId;
 
+/// The rules that can be got wrong, as they are right: each has been, in some engine. [`Sound`] keeps them
+/// all; others exist to see that the bench notices. They are types, so that the oracle pays nothing.
+pub trait PyramidRules {
+    /// Whether a frame asks the depth that the frame before it left.
+    const ASKS_LAST_FRAME: bool = false;
+
+    /// Level 0 of an image of `width` columns, from its depths row by row.
+    #[must_use]
+    fn level_0(width: usize, depths: Vec<f32>) -> Vec<f32> {
+        let _ = width;
+        depths
+    }
+
+    /// Texels along an axis of the level above one of `size`.
+    #[must_use]
+    fn halved(size: usize) -> usize {
+        size.div_ceil(2)
+    }
+
+    /// First and last sample of a rectangle along an axis of `size` samples, as the pyramid is asked.
+    #[must_use]
+    fn span(size: usize, first: u32, last: u32) -> (u32, u32) {
+        let _ = size;
+        (first, last)
+    }
+
+    /// The level at which a rectangle of samples `first` to `last` meets at most 2 × 2 texels.
+    #[must_use]
+    fn level(first: [u32; 2], last: [u32; 2]) -> usize {
+        let narrow = |k: &usize| (0..2).all(|axis| (last[axis] >> k) - (first[axis] >> k) <= 1);
+        (0..u32::BITS as usize - 1).find(narrow).unwrap_or(u32::BITS as usize - 1)
+    }
+
+    /// The texels looked at along an axis, of those that the rectangle's ends are in.
+    #[must_use]
+    fn looks(first: usize, last: usize) -> [usize; 2] {
+        [first, last]
+    }
+}
+
+/// All rules kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Sound;
+
+impl PyramidRules for Sound {}
+
 /// The oracle.
-pub struct HierarchicalZ {
+pub struct HierarchicalZ<R = Sound> {
     /// Draws; is never asked.
     sim: Sim,
-    pyramid: Pyramid,
+    pyramid: Pyramid<R>,
     /// Whether anything was drawn since the pyramid was built.
     stale: bool,
     answers: Batches,
 }
 
 /// Farthest depths, level by level; level 0 is the image.
-#[derive(Debug, Default)]
-struct Pyramid {
+#[derive(Debug)]
+struct Pyramid<R> {
     levels: Vec<Level>,
+    rules: PhantomData<R>,
 }
 
 #[derive(Debug)]
@@ -41,8 +91,8 @@ struct Level {
 
 impl Level {
     /// The next one up.
-    fn halved(&self) -> Self {
-        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
+    fn halved<R: PyramidRules>(&self) -> Self {
+        let (width, height) = (R::halved(self.width).max(1), R::halved(self.height).max(1));
         let mut texels = Vec::with_capacity(width * height);
         for y in 0..height {
             for x in 0..width {
@@ -59,25 +109,31 @@ impl Level {
     }
 }
 
-impl Pyramid {
+impl<R: PyramidRules> Pyramid<R> {
     /// Over an image of `width` columns, row by row.
     fn new(width: usize, depths: Vec<f32>) -> Self {
-        let mut levels = vec![Level { width, height: depths.len() / width, texels: depths }];
+        let height = depths.len() / width;
+        let mut levels = vec![Level { width, height, texels: R::level_0(width, depths) }];
         while let Some(last) = levels.last().filter(|level| level.texels.len() > 1) {
-            levels.push(last.halved());
+            levels.push(last.halved::<R>());
         }
-        Self { levels }
+        Self { levels, rules: PhantomData }
     }
 
     /// Whether a rectangle, columns `min[0]..max[0]` and rows `min[1]..max[1]`, may show a sample at
     /// `depth` or beyond.
     fn may_show(&self, min: [u32; 2], max: [u32; 2], depth: f32) -> bool {
-        let last = max.map(|end| end - 1);
-        let narrow = |k: &usize| (0..2).all(|axis| (last[axis] >> k) - (min[axis] >> k) <= 1);
-        let k = (0..self.levels.len()).find(narrow).unwrap_or(self.levels.len() - 1);
+        let base = &self.levels[0];
+        let (x0, x1) = R::span(base.width, min[0], max[0] - 1);
+        let (y0, y1) = R::span(base.height, min[1], max[1] - 1);
+        let k = R::level([x0, y0], [x1, y1]).min(self.levels.len() - 1);
         let level = &self.levels[k];
-        let texels = |axis: usize| (min[axis] >> k) as usize..=(last[axis] >> k) as usize;
-        texels(1).any(|y| texels(0).any(|x| level.texels[y * level.width + x] >= depth))
+        // No rule leads beyond the last texel; where one is broken, as samplers do.
+        let looks = |first: u32, last: u32, size: usize| {
+            R::looks((first >> k) as usize, (last >> k) as usize).map(|texel| texel.min(size - 1))
+        };
+        let (columns, rows) = (looks(x0, x1, level.width), looks(y0, y1, level.height));
+        rows.iter().any(|y| columns.iter().any(|x| level.texels[y * level.width + x] >= depth))
     }
 }
 
@@ -88,16 +144,30 @@ impl HierarchicalZ {
     /// Where the stage has not enough memory for its largest mesh.
     #[must_use]
     pub fn new(stage: Stage) -> Self {
-        Self {
-            sim: Sim::new(stage),
-            pyramid: Pyramid::default(),
-            stale: true,
-            answers: Batches::default(),
-        }
+        Self::by_rules(stage)
     }
 }
 
-impl Oracle for HierarchicalZ {
+impl<R: PyramidRules> HierarchicalZ<R> {
+    /// The same by other rules.
+    ///
+    /// # Panics
+    /// As [`HierarchicalZ::new`].
+    #[must_use]
+    pub fn by_rules(stage: Stage) -> Self {
+        let pyramid = Pyramid::new(1, vec![1.0]);
+        Self { sim: Sim::new(stage), pyramid, stale: true, answers: Batches::default() }
+    }
+
+    fn build(&mut self) {
+        let image = self.sim.image();
+        let width = image.viewport().width as usize;
+        self.pyramid = Pyramid::new(width, image.depths().collect());
+        self.stale = false;
+    }
+}
+
+impl<R: PyramidRules> Oracle for HierarchicalZ<R> {
     fn name(&self) -> &'static str {
         "hierarchical-z"
     }
@@ -107,6 +177,9 @@ impl Oracle for HierarchicalZ {
     }
 
     fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {
+        if R::ASKS_LAST_FRAME {
+            self.build();
+        }
         self.stale = true;
         self.answers.clear();
         self.sim.begin_frame(view)
@@ -118,11 +191,8 @@ impl Oracle for HierarchicalZ {
     }
 
     fn ask(&mut self, proxies: &[Proxy]) -> QueryId {
-        if self.stale && !proxies.is_empty() {
-            let image = self.sim.image();
-            let width = image.viewport().width as usize;
-            self.pyramid = Pyramid::new(width, image.depths().collect());
-            self.stale = false;
+        if self.stale && !proxies.is_empty() && !R::ASKS_LAST_FRAME {
+            self.build();
         }
         let visible = proxies.iter().any(|proxy| match *proxy {
             Proxy::Rectangle { min, max, depth } => self.pyramid.may_show(min, max, depth),
@@ -178,7 +248,7 @@ mod tests {
             let ((x0, x1), (y0, y1)) =
                 (span(corners[0], corners[1], width), span(corners[2], corners[3], height));
             let depth = f32::from(depth) / 4.0;
-            let pyramid = Pyramid::new(width, depths.clone());
+            let pyramid = Pyramid::<Sound>::new(width, depths.clone());
             let any = |[x0, y0]: [u32; 2], [x1, y1]: [u32; 2]| {
                 (y0..y1).any(|y| (x0..x1).any(|x| depths[y as usize * width + x as usize] >= depth))
             };

@@ -12,7 +12,7 @@ mod always;
 mod batches;
 mod cost;
 mod fit;
-mod hierarchical_z;
+pub mod hierarchical_z;
 #[cfg(feature = "hardware")]
 mod maxima;
 mod proxy_mesh;

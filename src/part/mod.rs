@@ -217,6 +217,19 @@ impl Partition {
         Self { meshes, mesh_of_object, first_part, first_draw }
     }
 
+    /// The same with every cut mesh altered, and its parts made drawable anew: for trials of the bench
+    /// itself. Numbers of parts and fragments must stay.
+    #[must_use]
+    pub fn altered(&self, alter: impl Fn(&mut PartedMesh)) -> Self {
+        let change = |mesh: &Arc<PartedMesh>| {
+            let mut mesh = PartedMesh::clone(mesh);
+            alter(&mut mesh);
+            mesh.drawable = mesh.parts.iter().map(|part| mesh.drawable(part)).collect();
+            Arc::new(mesh)
+        };
+        Self { meshes: self.meshes.iter().map(change).collect(), ..self.clone() }
+    }
+
     /// The cut meshes, in the scene's order.
     #[must_use]
     pub fn meshes(&self) -> &[Arc<PartedMesh>] {

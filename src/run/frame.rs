@@ -12,7 +12,7 @@ use crate::effect;
 use crate::index::{Entry, Move};
 use crate::math::{ClipError, rounded_clip_matrix};
 use crate::oracle::{MemoryKnobs, OracleError, Stage, least_budget};
-use crate::part::{Cache, Made, ObjectId, Partition, PartitionKnobs};
+use crate::part::{Cache, Made, ObjectId, PartedMesh, Partition, PartitionKnobs};
 use crate::scene::{Camera, Scene};
 
 /// A scene ready to run: cut into parts, its declared effects built.
@@ -62,6 +62,13 @@ impl World {
     #[must_use]
     pub fn rendered(self, render: Options) -> Self {
         Self { render, ..self }
+    }
+
+    /// The same with every cut mesh altered: for trials of the bench itself.
+    #[must_use]
+    pub fn altered(self, alter: fn(&mut PartedMesh)) -> Self {
+        let partition = Arc::new(self.partition.altered(alter));
+        Self { partition, ..self }
     }
 
     /// The same, out of core: devices hold no more geometry than this.
@@ -153,8 +160,12 @@ impl FrameState {
             let jumped = world.effects.jumped(object, t);
             Move { object: ObjectId(object), bounds, jumped }
         };
-        let moves =
-            if t == 0 { Vec::new() } else { world.effects.moving().iter().map(moved).collect() };
+        // Things at rest between two moves are not named: boxes tighten about them.
+        let differs = |&&object: &&u32| {
+            world.effects.placement(object, t) != world.effects.placement(object, t - 1)
+        };
+        let moving = if t == 0 { &[] } else { world.effects.moving() };
+        let moves = moving.iter().filter(differs).map(moved).collect();
         let matrices = objects.iter().map(|o| rounded_clip_matrix(&o.clip_from_object)).collect();
         Self { moment, camera, clip_from_world, objects, matrices, moves }
     }

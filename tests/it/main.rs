@@ -8,6 +8,7 @@ mod cli;
 mod common;
 mod compare;
 mod determinism;
+mod faults;
 mod golden;
 mod hard;
 mod held;

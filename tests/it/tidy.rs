@@ -4,8 +4,10 @@
 use std::path::{Path, PathBuf};
 
 /// Rooms from the top; a room may import only those before it.
-const ROOMS: [&str; 11] =
-    ["math", "scene", "part", "effect", "index", "oracle", "cull", "run", "check", "report", "cli"];
+const ROOMS: [&str; 12] = [
+    "math", "scene", "part", "effect", "index", "oracle", "cull", "run", "check", "fault",
+    "report", "cli",
+];
 /// Rooms that may not be imported although they stand above.
 const FORBIDDEN: [(&str, &[&str]); 4] = [
     ("index", &["scene", "effect"]),

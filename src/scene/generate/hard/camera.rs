@@ -381,3 +381,36 @@ fn split_screen(chosen: &Chosen) -> Result<Scene, SceneError> {
     };
     Ok(site.finish_views(chosen, SPLIT_SCREEN.name, vec![player(-1.0, 70.0), player(1.0, 50.0)]))
 }
+
+pub(super) const LAST_COLUMN: Generator = Generator {
+    name: "hard/last-column",
+    summary: "things that show in the last column and row alone, in an image of odd sides",
+    viewport: Viewport { width: 323, height: 243 },
+    build: last_column,
+    ..SMALL
+};
+
+fn last_column(chosen: &Chosen) -> Result<Scene, SceneError> {
+    let mut site = Site::default();
+    // One unit before the eye the picture is 2 units high; a pixel is so wide there.
+    let pixel = 2.0 / f64::from(chosen.viewport.height);
+    let (half_width, half_height) = (f64::from(chosen.viewport.width) * pixel * 0.5, 1.0);
+    // A wall over all but a pixel and a half of the right and the lower edge.
+    let gap = 1.5 * pixel;
+    let (width, height) = (2.0 * half_width + 1.0 - gap, 2.0 * half_height + 1.0 - gap);
+    let screen = site.mesh(wall(width, height, 4));
+    site.at(screen, -(0.5 + gap * 0.5), 0.5 + gap * 0.5, -1.0);
+    // Behind it, what reaches from the wall's middle into the gap, each a little less far than the last.
+    let bar = site.mesh(cube(DVec3::new(1.0, 0.1, 0.1), 3));
+    let post = site.mesh(cube(DVec3::new(0.1, 1.0, 0.1), 3));
+    let mut place = Stream::new(chosen.seed, "placement");
+    for number in 0..scaled(chosen, 12) {
+        let depth = 2.0 + f64::from(number) * 0.25;
+        let reach = 0.5 - place.range(-0.5, 1.5) * pixel * depth;
+        let along = place.range(-0.9, 0.8);
+        site.at(bar, half_width * depth - reach, along * depth, -depth);
+        site.at(post, along * depth, -half_height * depth + reach, -depth);
+    }
+    let poses = [pose([0.0, 0.0, 0.0], [0.0, 0.0, -1.0])];
+    Ok(site.finish(chosen, LAST_COLUMN.name, glide(chosen, &poses, 90.0, [0.1, 30.0])))
+}

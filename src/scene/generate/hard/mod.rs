@@ -46,6 +46,7 @@ pub const HARD: &[Generator] = &[
     camera::ONE_COLUMN,
     camera::ODD_VIEWPORT,
     camera::WIDE_VIEWPORT,
+    camera::LAST_COLUMN,
     camera::STEREO,
     camera::SPLIT_SCREEN,
     shapes::FLAT,
@@ -62,6 +63,7 @@ pub const HARD: &[Generator] = &[
     shapes::NOTHING,
     space::SCALES,
     space::COLLAPSED,
+    space::PIVOTS,
     space::FAR_FROM_ORIGIN,
     space::FAR_IN_MESH,
     space::TINY_WORLD,
@@ -71,6 +73,9 @@ pub const HARD: &[Generator] = &[
     time::CUSP,
     time::STOP_AND_GO,
     time::OUT_OF_SPACE,
+    time::PEEPING,
+    time::STRAYS,
+    time::SLITS,
     time::LONG_RUN,
 ];
 

@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 
 use super::{Placement, SMALL, Site, cube, glide, pose, scaled, wall};
 use crate::scene::generate::{Chosen, Generator, shape};
-use crate::scene::{CameraPath, Mesh, Scene, SceneError, Stream};
+use crate::scene::{CameraPath, Mesh, Path, Scene, SceneError, Stream};
 
 /// A camera that goes from side to side before `middle`, all lengths times `unit`.
 fn before(chosen: &Chosen, middle: DVec3, unit: f64) -> CameraPath {
@@ -154,4 +154,39 @@ fn overflow(chosen: &Chosen) -> Result<Scene, SceneError> {
     let block = site.mesh(cube(DVec3::ONE, 3));
     site.at(block, 1.0e30, 0.0, -1.0e30);
     Ok(site.finish(chosen, OVERFLOW.name, before(chosen, DVec3::ZERO, 1.0)))
+}
+
+pub(super) const PIVOTS: Generator = Generator {
+    name: "hard/pivots",
+    summary: "things that turn about a pivot far outside of them, across the edges of the view",
+    build: pivots,
+    ..SMALL
+};
+
+fn pivots(chosen: &Chosen) -> Result<Scene, SceneError> {
+    let mut site = Site::default();
+    let mut place = Stream::new(chosen.seed, "placement");
+    let mut motion = Stream::new(chosen.seed, "motion");
+    let blob = shape::blob(160, chosen.seed);
+    for arm in [2.0, 4.0, 6.0] {
+        let moved = |p: &[f32; 3]| [p[0] + arm, p[1], p[2]];
+        let positions = blob.positions().iter().map(moved).collect();
+        let mesh =
+            site.mesh(Mesh::new(format!("arm-{arm}"), positions, blob.triangles().to_vec())?);
+        for _ in 0..scaled(chosen, 14) {
+            let mut along = |reach: f64| place.range(-reach, reach);
+            let translation = DVec3::new(along(6.0), along(3.0), along(4.0));
+            let rotation = DQuat::from_rotation_y(along(3.0)) * DQuat::from_rotation_z(along(3.0));
+            let scale = DVec3::splat(0.5);
+            let object =
+                site.put(mesh, Placement { translation, rotation, scale, ..Placement::IDENTITY });
+            // On the spot: what moves is what hangs on the arm.
+            let (min, max) = (translation, translation);
+            let spin = motion.range(-0.4, 0.4);
+            site.movers.push((object, Path::Reflect { velocity: DVec3::ZERO, min, max, spin }));
+        }
+    }
+    let screen = site.mesh(wall(3.0, 3.0, 8));
+    site.at(screen, 0.5, 0.0, 4.5);
+    Ok(site.finish(chosen, PIVOTS.name, before(chosen, DVec3::ZERO, 1.0)))
 }

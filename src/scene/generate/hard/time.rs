@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{SMALL, Site, cube, glide, pose, scaled, wall};
+use super::{Builder, SMALL, Site, cube, glide, pose, scaled, wall};
 use crate::scene::generate::{Chosen, Generator, shape};
 use crate::scene::{CameraPath, Scene, SceneError, Stream, Travel, Viewport};
 
@@ -175,4 +175,95 @@ fn long_run(chosen: &Chosen) -> Result<Scene, SceneError> {
     let poses = [pose([-2.0, 1.0, 11.0], [0.0, 0.0, 0.0]), pose([3.0, 0.0, 9.0], [0.0, 0.0, 0.0])];
     let camera = glide(chosen, &poses, 60.0, [0.1, 30.0]);
     Ok(site.finish(chosen, LONG_RUN.name, CameraPath { duration: 500, ..camera }))
+}
+
+pub(super) const PEEPING: Generator = Generator {
+    name: "hard/peeping",
+    summary: "things at rest behind a wall show past its edge, their middles still behind it, then wholly",
+    frames: 40,
+    build: peeping,
+    ..SMALL
+};
+
+fn peeping(chosen: &Chosen) -> Result<Scene, SceneError> {
+    let mut site = Site::default();
+    let screen = site.mesh(wall(8.0, 8.0, 6));
+    site.at(screen, 0.0, 0.0, 5.0);
+    let thing = site.mesh(cube(DVec3::new(3.0, 0.8, 0.8), 4));
+    let mut place = Stream::new(chosen.seed, "placement");
+    // What hides at rest is past the edge in the other half of the time: by less than half of its length,
+    // or by all of it.
+    for number in 0..scaled(chosen, 24) {
+        let side = if number % 2 == 0 { 1.0 } else { -1.0 };
+        let (y, z) = (place.range(-3.0, 3.0), place.range(-6.0, -1.0));
+        let edge = 4.0 * (11.0 - z) / 6.0;
+        let object = site.at(thing, side * (edge - 2.5), y, z);
+        let out = if number % 3 == 0 { 5.0 } else { 2.3 + place.range(0.0, 0.15) };
+        site.jump(object, 8 + number % 5, &[DVec3::ZERO, DVec3::X * (side * out)]);
+    }
+    let posts = site.mesh(cube(DVec3::new(0.3, 6.0, 0.3), 3));
+    for x in [-24.0, 24.0] {
+        site.at(posts, x, 0.0, -4.0);
+    }
+    let poses = [pose([0.0, 0.0, 11.0], [0.0, 0.0, 0.0])];
+    Ok(site.finish(chosen, PEEPING.name, glide(chosen, &poses, 80.0, [0.1, 60.0])))
+}
+
+pub(super) const STRAYS: Generator = Generator {
+    name: "hard/strays",
+    summary: "the camera turns from the space that the index was built over to what has left it",
+    frames: 24,
+    build: strays,
+    ..SMALL
+};
+
+fn strays(chosen: &Chosen) -> Result<Scene, SceneError> {
+    let mut site = Site::default();
+    site.crowd(chosen, (DVec3::ZERO, DVec3::splat(3.0)), 40, false);
+    for object in (0..site.objects.len() as u32).step_by(4) {
+        let far = DVec3::new(0.0, 0.0, 30.0);
+        site.jump(object, 3 + object % 3, &[DVec3::ZERO, far, far * 1.2]);
+    }
+    let poses = [
+        pose([0.0, 1.0, 12.0], [0.0, 0.0, 0.0]),
+        pose([0.0, 1.0, 13.0], [9.0, 0.0, 20.0]),
+        pose([0.0, 1.0, 14.0], [0.0, 0.0, 30.0]),
+    ];
+    Ok(site.finish(chosen, STRAYS.name, glide(chosen, &poses, 60.0, [0.1, 80.0])))
+}
+
+pub(super) const SLITS: Generator = Generator {
+    name: "hard/slits",
+    summary: "things behind a wall with slits stand still until boxes are tight, then show in a slit",
+    frames: 30,
+    build: slits,
+    ..SMALL
+};
+
+fn slits(chosen: &Chosen) -> Result<Scene, SceneError> {
+    let mut site = Site::default();
+    // The eye is 6 before the wall and 9 before the things: what is x there is x · 1.5 here.
+    const PITCH: f64 = 2.5;
+    let columns = scaled(chosen, 8);
+    let middle = f64::from(columns - 1) * 0.5;
+    let mut panels = Builder::default();
+    for column in 0..columns {
+        let x = (f64::from(column) - middle) * PITCH;
+        let corner = DVec3::new(x - 1.0, -4.0, 0.0);
+        panels.grid(corner, DVec3::X * 2.0, DVec3::Y * 8.0, [1, 4], |_, _| DVec3::ZERO);
+    }
+    let panels = site.mesh(panels.finish("panels"));
+    site.at(panels, 0.0, 0.0, 3.0);
+    let thing = site.mesh(cube(DVec3::new(0.8, 1.2, 0.4), 3));
+    let mut rest = Stream::new(chosen.seed, "rest");
+    for column in 0..columns {
+        let x = (f64::from(column) - middle) * PITCH * 1.5;
+        for y in [-1.5, 1.5] {
+            // Right of the panel's middle, and then in the slit to its left, within the same node.
+            let object = site.at(thing, x + 0.6, y, 0.0);
+            site.jump(object, 7 + rest.below(4), &[DVec3::ZERO, DVec3::X * -2.4]);
+        }
+    }
+    let poses = [pose([0.0, 0.0, 9.0], [0.0, 0.0, 0.0])];
+    Ok(site.finish(chosen, SLITS.name, glide(chosen, &poses, 75.0, [0.1, 40.0])))
 }

@@ -1,0 +1,150 @@
+//! Faults: cullers, oracles, indexes and math broken on purpose, one real bug class each, to see that the
+//! bench notices. A check earns its trust here: a fault that gets through is a hole in the gate, a failure
+//! of an unbroken culler a false alarm. It must not know reports.
+//!
+//! A fault is a [`Rig`] (culler, index, oracle) that differs from a sound rig in one respect. Nothing of
+//! it is in the way of what a run calls: broken rules are types, broken parts wrap sound ones.
+//!
+//! | file | what is broken |
+//! |---|---|
+//! | `two_pass` | a culler as engines have it: projections, tests, lists, views |
+//! | `spheres` | spheres against planes |
+//! | `sight` | what a sound culler is shown |
+//! | `history` | what `full` remembers |
+//! | `pyramid` | hierarchical z |
+//! | `answers` | what becomes of questions and answers |
+//! | `structure` | the scene tree's upkeep, the cut |
+
+mod answers;
+mod history;
+mod pyramid;
+mod sight;
+mod spheres;
+mod structure;
+mod trial;
+mod two_pass;
+
+use crate::cull::{Culler, CullerSetup};
+use crate::index::{Entry, Index};
+use crate::oracle::{Oracle, Stage};
+use crate::part::PartedMesh;
+
+pub use trial::{Evidence, Trial, false_alarms, world};
+
+/// Makes an oracle over a stage.
+pub type MakeOracle = fn(Stage) -> Box<dyn Oracle>;
+/// Makes a culler from what it stands on.
+pub type MakeCuller = fn(CullerSetup) -> Box<dyn Culler>;
+/// Makes an index over the objects of frame 0.
+pub type MakeIndex = fn(&[Entry]) -> Box<dyn Index>;
+
+/// A culler with what it stands on.
+#[derive(Clone, Copy, Debug)]
+pub struct Rig {
+    /// Name for reports.
+    pub name: &'static str,
+    /// The culler.
+    pub culler: MakeCuller,
+    /// The index it is given.
+    pub index: MakeIndex,
+    /// The oracle it asks.
+    pub oracle: MakeOracle,
+    /// Whether one culler serves all views of a frame, and tells them apart itself.
+    pub keeps_views: bool,
+    /// What is done to each mesh after it is cut.
+    pub alter: Option<fn(&mut PartedMesh)>,
+}
+
+/// What a fault does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Harm {
+    /// Something visible is not drawn: the picture changes.
+    Drops,
+    /// It errs towards visible: the picture holds, more is drawn or asked than by the sound rig.
+    Overdraws,
+}
+
+/// One seeded fault.
+#[derive(Clone, Copy, Debug)]
+pub struct Fault {
+    /// Name for flags and reports.
+    pub name: &'static str,
+    /// Its number in the list of bug classes, 1 to [`BUG_CLASSES`].
+    pub bug: u8,
+    /// What is wrong, in a line.
+    pub summary: &'static str,
+    /// What it does.
+    pub harm: Harm,
+    /// Scenes in which it shows, the likeliest first.
+    pub scenes: &'static [&'static str],
+    /// What it is a broken form of.
+    pub sound: Rig,
+    /// The broken form.
+    pub broken: Rig,
+}
+
+/// How many bug classes the list has.
+pub const BUG_CLASSES: u8 = 60;
+
+/// Every seeded fault, by number of its bug class.
+#[must_use]
+pub fn faults() -> Vec<Fault> {
+    let families = [
+        two_pass::FAULTS,
+        spheres::FAULTS,
+        sight::FAULTS,
+        history::FAULTS,
+        pyramid::FAULTS,
+        answers::FAULTS,
+        structure::FAULTS,
+    ];
+    let mut all = families.concat();
+    all.sort_by_key(|fault| fault.bug);
+    all
+}
+
+/// The sound rigs that faults are broken forms of.
+pub const SOUND: &[Rig] =
+    &[history::FULL, history::VFC, two_pass::EXACT, two_pass::PYRAMID, spheres::RIG];
+
+/// Bug classes that are no fault of a culler's as it is here, with what holds them or what they await.
+pub const OTHERS: &[(u8, &str)] = &[
+    (9, "orthographic camera: hard/orthographic"),
+    (20, "scale changed at run time: awaits an effect that scales"),
+    (21, "animated mesh keeps its rest box: awaits articulated motion"),
+    (26, "wide cones: hard/wide-angle; cones themselves await a culler that uses them"),
+    (28, "T-junctions against the device's coverage: hard/t-junctions"),
+    (30, "alpha-tested or transparent occluders: awaits materials"),
+    (40, "the eye on the cusp of a query box: hard/cusp, hard/ping-pong"),
+    (42, "samples in place of pixels: awaits multisampling"),
+    (46, "done after failing through the first portal: awaits portals"),
+    (48, "incoming directions reset in a cell graph: awaits portals"),
+    (49, "a vertex on the plane lost while a portal is clipped: awaits portals"),
+    (51, "an off-screen shadow caster culled: awaits lights"),
+    (53, "an old index into the table of levels: awaits LOD"),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::generate::HARD;
+
+    #[test]
+    fn every_class_is_seeded_or_told_of() {
+        let faults = faults();
+        for bug in 1..=BUG_CLASSES {
+            let seeded = faults.iter().filter(|fault| fault.bug == bug).count();
+            let told = OTHERS.iter().filter(|(other, _)| *other == bug).count();
+            assert!((seeded > 0) != (told == 1), "class {bug}: {seeded} seeded, {told} told of");
+        }
+        let mut names: Vec<&str> = faults.iter().map(|fault| fault.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), faults.len());
+        let mut classes: Vec<u8> = faults.iter().map(|fault| fault.bug).collect();
+        classes.dedup();
+        assert!(classes.len() >= 40, "{} classes are seeded", classes.len());
+        let hard = |scene: &&str| HARD.iter().any(|generator| generator.name == *scene);
+        assert!(faults.iter().all(|fault| fault.scenes.iter().all(hard)));
+    }
+}
