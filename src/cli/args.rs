@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use plainsight_reference::fast::{Options, SimdLevel};
 
 use super::faults::FaultsArgs;
+use super::why::WhyArgs;
 use crate::cull::ProxyKind;
 use crate::oracle::{MIB, MemoryKnobs};
 use crate::part::{Crossing, PartitionKnobs};
@@ -39,6 +40,8 @@ pub(super) enum Verb {
     Compare(CompareArgs),
     /// Measure what work costs a device and write the file that `--cost` reads.
     Calibrate(CalibrateArgs),
+    /// Say what decided over one part in one frame, and draw it.
+    Why(WhyArgs),
     /// Put the gate itself on trial: every seeded fault must be caught.
     Faults(FaultsArgs),
     /// List scenes, cullers, oracles, indexes and devices.

@@ -11,6 +11,7 @@ mod picture;
 mod progress;
 mod replay;
 mod run;
+mod why;
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -103,6 +104,7 @@ pub fn main(
         args::Verb::Picture(args) => picture::picture(&args, cullers, &mut streams),
         args::Verb::Compare(args) => compare::compare(&args, cullers, &mut streams),
         args::Verb::Calibrate(args) => calibrate::calibrate(&args, &mut streams),
+        args::Verb::Why(args) => why::why(&args, cullers, &mut streams),
         args::Verb::Faults(args) => faults::faults(&args, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),
     };

@@ -11,10 +11,24 @@ use super::{CliError, EXIT_HELD, OutFile, Streams};
 use crate::cull::CullerKind;
 use crate::part::PartId;
 use crate::report::{Shown, depth_picture, part_picture, picture_png, top_view};
-use crate::run::{FrameState, Moment, Truth, render};
+use crate::run::{FrameState, Moment, Truth, World, render};
 
 /// Pixels along a side of the view from above.
 const TOP_VIEW_SIDE: u32 = 1024;
+
+/// The moment of that frame and view, if the scene has such a view.
+pub(super) fn moment_of(
+    world: &World,
+    scene: &str,
+    (frame, view): (u32, u32),
+) -> Result<Moment, CliError> {
+    let views = world.views();
+    if view >= views {
+        let what = format!("--view {view}: {scene} has {views} views, counted from 0");
+        return Err(CliError::Usage(what));
+    }
+    Ok(Moment { frame, view })
+}
 
 pub(super) fn picture(
     args: &PictureArgs,
@@ -45,12 +59,7 @@ pub(super) fn picture(
     let world = named.world(&scene_args, plan.cache.as_ref(), &bar, streams);
     bar.finish_and_clear();
     let world = world?;
-    let moment = Moment { frame: args.frame, view: args.view };
-    if moment.view >= world.views() {
-        let (view, views) = (moment.view, world.views());
-        let what = format!("--view {view}: {} has {views} views, counted from 0", args.scene);
-        return Err(CliError::Usage(what));
-    }
+    let moment = moment_of(&world, &args.scene, (args.frame, args.view))?;
     let state = FrameState::at(&world, moment);
     let truth = Truth::of(&world, &state);
     let drawn: Vec<PartId> = if needs_culler {

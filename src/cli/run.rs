@@ -16,8 +16,8 @@ use crate::oracle::{Always, CostModel, HierarchicalZ, Oracle, OracleError, Quest
 use crate::part::{Cache, PartId};
 use crate::report::{Row, table};
 use crate::run::{
-    FrameRecord, Lane, LaneInfo, Moment, Observer, Repeat, Trace, World, partition_difference,
-    run as run_lanes,
+    FrameRecord, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World,
+    partition_difference, run as run_lanes,
 };
 use crate::scene::{Scene, generate};
 
@@ -331,6 +331,20 @@ impl Plan<'_> {
         Ok(seen.1)
     }
 
+    /// Lends the first lane's culler and oracle, new ones, to `work`.
+    pub(super) fn with_lane<T>(
+        &self,
+        world: &World,
+        work: impl FnOnce(&mut dyn Culler, &mut dyn Oracle) -> Result<T, RunError>,
+    ) -> Result<T, CliError> {
+        let stage = world.stage();
+        let staged = self.oracles.stage(&stage)?;
+        let mut oracle = staged.make(&staged.names[0])?;
+        let entries = world.entries();
+        let mut culler = self.factory(self.cullers[0], world, &entries)();
+        Ok(work(culler.as_mut(), oracle.as_mut())?)
+    }
+
     fn factory<'a>(
         &'a self,
         kind: CullerKind,
@@ -494,6 +508,16 @@ pub(super) fn tell_failures(
         writeln!(streams.talk, "FAILED: {} on {}", lane.culler, lane.oracle)?;
         gate.failures().iter().try_for_each(|line| writeln!(streams.talk, "  {line}"))?;
         writeln!(streams.talk, "  replay: {} --expect {:016x}", lane.replay, trace.hash())?;
+        let lane = lane.replay.strip_prefix("plainsight replay ");
+        if let (Some(lane), Some(miss)) = (lane, gate.conservative.misses().first()) {
+            let Moment { frame, view } = miss.moment;
+            let view = if view > 0 { format!(" --view {view}") } else { String::new() };
+            let part = miss.part.0;
+            writeln!(
+                streams.talk,
+                "  why: plainsight why {lane} --frame {frame}{view} --part {part}"
+            )?;
+        }
     }
     Ok(())
 }

@@ -405,9 +405,10 @@ impl Adaptive {
         pen: &mut Pen<'_>,
         batch: &Batch,
     ) -> Result<(), OracleError> {
-        let questions = batch.asked.iter().map(|(question, _)| question);
-        for question in questions.chain(batch.due.iter().map(|(question, _)| question)) {
-            pen.ask_any(&self.proxies[question.proxies.clone()]);
+        let asked = batch.asked.iter().map(|(question, pending)| (question, pending.item));
+        let due = batch.due.iter().map(|(question, drawn)| (question, drawn.item));
+        for (question, item) in asked.chain(due) {
+            pen.ask_about([item], &self.proxies[question.proxies.clone()]);
             self.account.asked += question.price;
         }
         let mut answers = Vec::new();
@@ -561,5 +562,9 @@ impl Culler for Adaptive {
 
     fn check(&self) -> Result<(), String> {
         self.scenery.check()
+    }
+
+    fn scenery(&self, _: u32) -> Option<&Scenery> {
+        Some(&self.scenery)
     }
 }

@@ -78,7 +78,7 @@ impl Culler for Chc {
                             );
                         }
                         if is_part || !was_visible {
-                            pen.ask(&proxy);
+                            pen.ask_about([item], &[proxy]);
                             asked.push(Asked { item, place, was_visible });
                         }
                     }
@@ -118,5 +118,9 @@ impl Culler for Chc {
 
     fn check(&self) -> Result<(), String> {
         self.scenery.check()
+    }
+
+    fn scenery(&self, _: u32) -> Option<&Scenery> {
+        Some(&self.scenery)
     }
 }

@@ -85,7 +85,7 @@ impl ChcPlus {
         for end in group::runs(&chances, MOST_TOGETHER) {
             let nodes: Vec<Node> = rest.by_ref().take(end - start).collect();
             let proxies: Vec<Proxy> = nodes.iter().flat_map(|n| n.proxies.clone()).collect();
-            pen.ask_any(&proxies);
+            pen.ask_about(nodes.iter().map(|node| node.item), &proxies);
             self.asked.push(nodes);
             start = end;
         }
@@ -187,7 +187,7 @@ impl Culler for ChcPlus {
             self.ask_queued(pen);
             // Nobody waits for these, so they go last.
             for node in due.drain(..) {
-                pen.ask_any(&node.proxies);
+                pen.ask_about([node.item], &node.proxies);
                 self.asked.push(vec![node]);
             }
             if self.asked.is_empty() {
@@ -207,5 +207,9 @@ impl Culler for ChcPlus {
 
     fn check(&self) -> Result<(), String> {
         self.scenery.check()
+    }
+
+    fn scenery(&self, _: u32) -> Option<&Scenery> {
+        Some(&self.scenery)
     }
 }

@@ -333,7 +333,7 @@ impl<R: HistoryRules> Full<R> {
             for candidate in &group.nodes {
                 self.push_proxies(view, candidate.item, candidate.proxy);
             }
-            pen.ask_any(&self.frame.proxies);
+            pen.ask_about(group.nodes.iter().map(|node| node.item), &self.frame.proxies);
         }
         let room = self.knobs.most_in_flight - groups.len();
         let later = self.frame.due.split_off(room.min(self.frame.due.len()));
@@ -341,7 +341,7 @@ impl<R: HistoryRules> Full<R> {
         for part in &due {
             self.frame.proxies.clear();
             self.push_proxies(view, part.item, part.proxy);
-            pen.ask_any(&self.frame.proxies);
+            pen.ask_about([part.item], &self.frame.proxies);
         }
         let mut answers = Vec::new();
         pen.round_trip(&mut answers)?;
@@ -450,5 +450,17 @@ impl<R: HistoryRules> Culler for Full<R> {
 
     fn check(&self) -> Result<(), String> {
         self.scenery.check()
+    }
+
+    fn scenery(&self, _: u32) -> Option<&Scenery> {
+        Some(&self.scenery)
+    }
+
+    fn recall(&self, view: &View<'_>, item: Item) -> Option<String> {
+        let history = self.history.get(self.scenery.slot(item))?;
+        (history.visible_after > view.frame && history.ask_from > view.frame + 1).then(|| {
+            let (streak, from) = (history.streak, history.ask_from);
+            format!("{streak} \"visible\" answers in a row: not asked about before frame {from}")
+        })
     }
 }

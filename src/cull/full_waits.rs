@@ -172,7 +172,7 @@ impl FullWaits {
                 item,
                 if free {
                     asked += 1;
-                    State::Asked(pen.ask(&proxy))
+                    State::Asked(pen.ask_about([item], &[proxy]))
                 } else {
                     State::Waiting(rectangle, proxy)
                 },
@@ -220,5 +220,17 @@ impl Culler for FullWaits {
 
     fn check(&self) -> Result<(), String> {
         self.scenery.check()
+    }
+
+    fn scenery(&self, _: u32) -> Option<&Scenery> {
+        Some(&self.scenery)
+    }
+
+    fn recall(&self, view: &View<'_>, item: Item) -> Option<String> {
+        let history = self.history.get(self.scenery.slot(item))?;
+        (history.visible_after > view.frame && history.ask_from > view.frame + 1).then(|| {
+            let (streak, from) = (history.streak, history.ask_from);
+            format!("{streak} \"visible\" answers in a row: not asked about before frame {from}")
+        })
     }
 }

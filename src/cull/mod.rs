@@ -9,6 +9,7 @@ mod draw_all;
 pub mod full;
 mod full_waits;
 pub mod group;
+mod journal;
 mod layers;
 mod opened;
 mod pen;
@@ -31,10 +32,11 @@ pub use chc_plus::ChcPlus;
 pub use draw_all::DrawAll;
 pub use full::{AfterGroup, Full, FullKnobs};
 pub use full_waits::{FullWaits, FullWaitsKnobs};
+pub use journal::{Journal, Question};
 pub use pen::{Counts, Pen};
 pub use per_view::PerView;
 pub use postponement::Postponement;
-pub use scenery::{Item, NodeHistory, Scenery, SceneryKnobs, Weight};
+pub use scenery::{Appearance, Item, NodeHistory, Scenery, SceneryKnobs, Weight};
 pub use simple::Simple;
 pub use view::{ObjectView, View};
 pub use view_frustum::ViewFrustum;
@@ -67,6 +69,19 @@ pub trait Culler {
     /// The first broken promise, in words.
     fn check(&self) -> Result<(), String> {
         Ok(())
+    }
+
+    /// The two levels as this culler walks them in one of the frame's views, so that others can say why it
+    /// did what it did. `None` for one without; then no more is known of it than what it drew.
+    fn scenery(&self, view: u32) -> Option<&Scenery> {
+        let _ = view;
+        None
+    }
+
+    /// What it remembers of a node after the frame of `view`, in words for people; `None` for nothing.
+    fn recall(&self, view: &View<'_>, item: Item) -> Option<String> {
+        let _ = (view, item);
+        None
     }
 }
 

@@ -1,6 +1,7 @@
 //! The pen: what a culler draws and asks with. It hands everything on to the oracle and keeps the
 //! record that the trace is made of.
 
+use super::{Item, Journal, Question};
 use crate::oracle::{Amounts, Answer, Oracle, OracleError, Proxy, QueryId};
 use crate::part::{PartId, Partition};
 
@@ -45,6 +46,7 @@ pub struct Pen<'a> {
     already: Vec<bool>,
     counts: Counts,
     events_hash: u64,
+    journal: Option<&'a mut Journal>,
 }
 
 impl<'a> Pen<'a> {
@@ -57,6 +59,20 @@ impl<'a> Pen<'a> {
             already: vec![false; partition.part_count() as usize],
             counts: Counts::default(),
             events_hash: 0xcbf2_9ce4_8422_2325,
+            journal: None,
+        }
+    }
+
+    /// The same pen, that keeps a journal as well.
+    #[must_use]
+    pub fn writing(self, journal: &'a mut Journal) -> Self {
+        Self { journal: Some(journal), ..self }
+    }
+
+    /// Says that a node is walked into; see [`Journal`].
+    pub(super) fn opens(&mut self, item: Item) {
+        if let Some(journal) = &mut self.journal {
+            journal.opened.push(item);
         }
     }
 
@@ -80,9 +96,23 @@ impl<'a> Pen<'a> {
 
     /// One question about several proxies: whether any sample of any of them would pass.
     pub fn ask_any(&mut self, proxies: &[Proxy]) -> QueryId {
+        self.ask_about(std::iter::empty(), proxies)
+    }
+
+    /// The same, saying which nodes the proxies stand for; see [`Journal`].
+    pub fn ask_about(
+        &mut self,
+        items: impl IntoIterator<Item = Item>,
+        proxies: &[Proxy],
+    ) -> QueryId {
         self.counts.queries += 1;
         self.counts.proxies += proxies.len() as u64;
         let query = self.oracle.ask(proxies);
+        if let Some(journal) = &mut self.journal {
+            let (items, proxies) = (items.into_iter().collect(), proxies.to_vec());
+            let after_opened = journal.opened.len();
+            journal.questions.push(Question { query, items, proxies, visible: None, after_opened });
+        }
         self.note(2, u64::from(query.0));
         for proxy in proxies {
             self.counts.pixels += proxy.pixels();
@@ -107,6 +137,13 @@ impl<'a> Pen<'a> {
         for answer in &answers[before..] {
             self.counts.visible_answers += u64::from(answer.visible);
             self.note(4, u64::from(answer.query.0) << 1 | u64::from(answer.visible));
+            let question = self
+                .journal
+                .as_mut()
+                .and_then(|j| j.questions.iter_mut().find(|q| q.query == answer.query));
+            if let Some(question) = question {
+                question.visible = Some(answer.visible);
+            }
         }
         Ok(())
     }

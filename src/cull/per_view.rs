@@ -2,7 +2,7 @@
 //! view has a history and an index of its own, and every culler that knows one view serves many. It
 //! costs an index update a view.
 
-use super::{Culler, Pen, View};
+use super::{Culler, Item, Pen, Scenery, View};
 use crate::oracle::OracleError;
 
 /// Hands each view to the culler of that number.
@@ -33,5 +33,13 @@ impl Culler for PerView {
 
     fn check(&self) -> Result<(), String> {
         self.cullers.iter().try_for_each(|culler| culler.check())
+    }
+
+    fn scenery(&self, view: u32) -> Option<&Scenery> {
+        self.cullers[view as usize].scenery(view)
+    }
+
+    fn recall(&self, view: &View<'_>, item: Item) -> Option<String> {
+        self.cullers[view.view as usize].recall(view, item)
     }
 }

@@ -88,7 +88,7 @@ impl Weight {
 
 /// How a box appears this frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Appearance {
+pub enum Appearance {
     /// On no sample.
     Nowhere,
     /// Visible without a question.
@@ -126,6 +126,12 @@ impl Scenery {
             node_error: Vec::new(),
             node_weight: Vec::new(),
         }
+    }
+
+    /// The index.
+    #[must_use]
+    pub fn index(&self) -> &dyn Index {
+        self.index.as_ref()
     }
 
     /// How many nodes both levels have together; may grow from frame to frame.
@@ -259,7 +265,8 @@ impl Scenery {
     }
 
     /// The node's box in clip space; `None` where its contents may stick out of it.
-    fn clip_box(&self, view: &View<'_>, item: Item) -> Option<ClipBox> {
+    #[must_use]
+    pub fn clip_box(&self, view: &View<'_>, item: Item) -> Option<ClipBox> {
         Some(match item {
             Item::Scene(node) => {
                 let this = self.index.node(node);
@@ -291,7 +298,8 @@ impl Scenery {
     }
 
     /// What there is to ask about a node.
-    pub(super) fn appearance(&self, view: &View<'_>, item: Item) -> Appearance {
+    #[must_use]
+    pub fn appearance(&self, view: &View<'_>, item: Item) -> Appearance {
         if let Item::Scene(node) = item
             && self.index.node(node).subtree_objects == 0
         {
@@ -437,6 +445,7 @@ impl Scenery {
         pen: &mut Pen<'_>,
         out: &mut Vec<Item>,
     ) {
+        pen.opens(item);
         match item {
             Item::Scene(node) => self.expand_scene(view, node, pen, out),
             Item::Object(object, node) => self.expand_object(view, object, node, pen, out),

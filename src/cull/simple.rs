@@ -33,7 +33,7 @@ impl Culler for Simple {
                 Appearance::Nowhere => false,
                 Appearance::Certain => true,
                 Appearance::Ask { proxy, .. } => {
-                    pen.ask(&proxy);
+                    pen.ask_about([item], &[proxy]);
                     answers.clear();
                     pen.round_trip(&mut answers)?;
                     answers.iter().all(|answer| answer.visible)
@@ -49,5 +49,9 @@ impl Culler for Simple {
 
     fn check(&self) -> Result<(), String> {
         self.scenery.check()
+    }
+
+    fn scenery(&self, _: u32) -> Option<&Scenery> {
+        Some(&self.scenery)
     }
 }

@@ -39,4 +39,8 @@ impl Culler for ViewFrustum {
     fn check(&self) -> Result<(), String> {
         self.scenery.check()
     }
+
+    fn scenery(&self, _: u32) -> Option<&Scenery> {
+        Some(&self.scenery)
+    }
 }

@@ -62,6 +62,23 @@ pub enum Projection {
     },
 }
 
+/// A side of the frustum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrustumPlane {
+    /// x = −w.
+    Left,
+    /// x = w.
+    Right,
+    /// y = −w.
+    Bottom,
+    /// y = w.
+    Top,
+    /// z = 0.
+    Near,
+    /// z = w.
+    Far,
+}
+
 /// The corners of a box in clip space with the bound on its contents' error.
 #[derive(Clone, Copy, Debug)]
 pub struct ClipBox {
@@ -82,16 +99,25 @@ impl ClipBox {
     /// makes this false.
     #[must_use]
     pub fn outside_frustum(&self) -> bool {
+        self.beyond().is_some()
+    }
+
+    /// The first plane that the box, moved outward by its error, lies wholly beyond.
+    #[must_use]
+    pub fn beyond(&self) -> Option<FrustumPlane> {
         let [ex, ey, ez, ew] = self.error;
         let beyond = |inside: &dyn Fn(&DVec4) -> f64, margin: f64| {
             self.corners.iter().all(|corner| inside(corner) + margin < 0.0)
         };
-        beyond(&|c| c.w + c.x, ex + ew)
-            || beyond(&|c| c.w - c.x, ex + ew)
-            || beyond(&|c| c.w + c.y, ey + ew)
-            || beyond(&|c| c.w - c.y, ey + ew)
-            || beyond(&|c| c.z, ez)
-            || beyond(&|c| c.w - c.z, ez + ew)
+        match () {
+            () if beyond(&|c| c.w + c.x, ex + ew) => Some(FrustumPlane::Left),
+            () if beyond(&|c| c.w - c.x, ex + ew) => Some(FrustumPlane::Right),
+            () if beyond(&|c| c.w + c.y, ey + ew) => Some(FrustumPlane::Bottom),
+            () if beyond(&|c| c.w - c.y, ey + ew) => Some(FrustumPlane::Top),
+            () if beyond(&|c| c.z, ez) => Some(FrustumPlane::Near),
+            () if beyond(&|c| c.w - c.z, ez + ew) => Some(FrustumPlane::Far),
+            () => None,
+        }
     }
 
     /// Whether every corner is inside all six planes. Exact up to rounding, with no margin: for

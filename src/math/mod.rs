@@ -9,7 +9,7 @@ mod trig;
 
 pub use aabb::{Aabb, TRANSFORM_MARGIN};
 pub use clip_box::{
-    ClipBox, DEPTH_ROUNDING, PixelRectangle, Projection, RECTANGLE_DILATION_PIXELS,
+    ClipBox, DEPTH_ROUNDING, FrustumPlane, PixelRectangle, Projection, RECTANGLE_DILATION_PIXELS,
 };
 pub use clip_error::{CLIP_ERROR_GAMMA, ClipError, rounded_clip_matrix};
 pub use inflate::{BOX_DEPTH_SLACK, inflated_box};

@@ -1,6 +1,7 @@
 //! What people look at: the table of a run, its lines as JSON, and pictures. Reports read traces and
 //! gates; they decide nothing.
 
+mod account;
 mod chart;
 mod columns;
 mod comparison;
@@ -8,6 +9,7 @@ mod memory;
 mod picture;
 mod row;
 
+pub use account::{account_picture, decision_line, item_name, step_line, truth_line};
 pub use chart::{Chart, Series};
 pub use columns::wrapped;
 pub use comparison::{Comparison, Published, TABLE_1};

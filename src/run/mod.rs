@@ -2,12 +2,14 @@
 //! that run side by side; each finished frame is handed to the lane's observers and then forgotten.
 //! It must not know the checks: an observer is anything that implements [`Observer`].
 
+mod account;
 mod calibrate;
 mod frame;
 mod lane;
 mod trace;
 mod truth;
 
+pub use account::{Account, Made, PartTruth, Step, account};
 pub use calibrate::{Bench, CalibrationKnobs, Workload, frames_to_measure, measure, workloads};
 pub use frame::{FrameState, World};
 pub use lane::{Lane, LaneInfo, Observer, Repeat, RunError, run};

@@ -73,6 +73,11 @@ fn a_dropped_part_is_caught_and_replays() {
         assert_eq!(code, EXIT_FAILED, "{out}{talk}");
         assert!(!talk.contains("is not the expected"), "{talk}");
         assert!(talk.contains("set: frame 7 part "), "{talk}");
+        let why = talk.lines().find_map(|line| line.trim().strip_prefix("why: ")).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let (code, out, talk) = run(&format!("{why} --out {}/why.png", folder.path().display()));
+        assert_eq!(code, EXIT_HELD, "{out}{talk}");
+        assert!(out.contains("truth: visible in ") && out.contains("\nculled; "), "{out}");
     }
 }
 

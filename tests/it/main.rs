@@ -22,3 +22,4 @@ mod readers;
 mod snapshots;
 mod tidy;
 mod tolerance;
+mod why;
