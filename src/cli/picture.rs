@@ -1,6 +1,6 @@
 //! `picture`: one frame as PNG.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use plainsight_reference::Image;
 
@@ -15,6 +15,12 @@ use crate::run::{FrameState, Moment, Truth, World, render};
 
 /// Pixels along a side of the view from above.
 const TOP_VIEW_SIDE: u32 = 1024;
+
+/// The name of a file about a scene: its own without folder and ending, a dash, `rest`.
+pub(super) fn named_after(scene: &str, rest: &str) -> PathBuf {
+    let stem = Path::new(scene).file_stem().unwrap_or_default().to_string_lossy();
+    format!("{stem}-{rest}").into()
+}
 
 /// The moment of that frame and view, if the scene has such a view.
 pub(super) fn moment_of(
@@ -41,10 +47,8 @@ pub(super) fn picture(
         Layer::Culled => "culled",
         Layer::Top => "top",
     };
-    let stem = PathBuf::from(&args.scene);
-    let stem = stem.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let path =
-        args.out.clone().unwrap_or_else(|| format!("{stem}-{}-{layer}.png", args.frame).into());
+    let own_name = || named_after(&args.scene, &format!("{}-{layer}.png", args.frame));
+    let path = args.out.clone().unwrap_or_else(own_name);
     let out = OutFile::create(&path)?;
     let mut scene_args = args.scene_args.clone();
     // A culler's history reaches back, so the frames before are run as well; the truth needs none.

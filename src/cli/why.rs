@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::args::SceneArgs;
-use super::picture::moment_of;
+use super::picture::{moment_of, named_after};
 use super::progress::progress_bar;
 use super::run::{catch_interrupt, interrupted, one_lane};
 use super::{CliError, EXIT_HELD, OutFile, Streams};
@@ -15,7 +15,7 @@ use crate::part::PartId;
 use crate::report::{
     account_picture, decision_line, item_name, picture_png, step_line, truth_line,
 };
-use crate::run::account;
+use crate::run::{FrameState, Moment, Truth, World, account};
 
 /// Version of the JSON line.
 const JSON_SCHEMA: u32 = 1;
@@ -75,12 +75,8 @@ pub(super) fn why(
     let world = world?;
     let moment = moment_of(&world, &args.scene, (args.frame, args.view))?;
     let part = part_of(args, &world, moment)?;
-    let stem = PathBuf::from(&args.scene);
-    let stem = stem.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let path = args
-        .out
-        .clone()
-        .unwrap_or_else(|| format!("{stem}-{}-part-{}.png", args.frame, part.0).into());
+    let own_name = || named_after(&args.scene, &format!("{}-part-{}.png", args.frame, part.0));
+    let path = args.out.clone().unwrap_or_else(own_name);
     let out = OutFile::create(&path)?;
     let bar = progress_bar();
     bar.inc_length((u64::from(moment.frame) + 1) * u64::from(world.views()));
@@ -141,11 +137,7 @@ pub(super) fn why(
 }
 
 /// The part that was meant.
-fn part_of(
-    args: &WhyArgs,
-    world: &crate::run::World,
-    moment: crate::run::Moment,
-) -> Result<PartId, CliError> {
+fn part_of(args: &WhyArgs, world: &World, moment: Moment) -> Result<PartId, CliError> {
     let usage = |what: String| CliError::Usage(what);
     let Some([x, y]) = args.pixel else {
         let (part, count) = (args.part.unwrap_or(0), world.partition.part_count());
@@ -160,8 +152,8 @@ fn part_of(
         let (width, height) = (viewport.width, viewport.height);
         return Err(usage(format!("--pixel {x},{y}: the picture is {width} x {height} pixels")));
     }
-    let state = crate::run::FrameState::at(world, moment);
-    let truth = crate::run::Truth::of(world, &state);
+    let state = FrameState::at(world, moment);
+    let truth = Truth::of(world, &state);
     truth
         .part_at(world, (y * viewport.width + x) as usize)
         .ok_or_else(|| usage(format!("--pixel {x},{y}: nothing shows there in {moment}")))

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{Fault, Harm, MakeOracle, Rig, two_pass};
+use super::{Fault, Rig, two_pass};
 use crate::oracle::{
     Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Sim, Stage,
 };
@@ -142,70 +142,60 @@ impl Oracle for Wrong {
     }
 }
 
-const fn fault(
-    (name, bug): (&'static str, u8),
-    summary: &'static str,
-    (harm, scenes): (Harm, &'static [&'static str]),
-    oracle: MakeOracle,
-) -> Fault {
-    let broken = Rig { oracle, ..two_pass::EXACT };
-    Fault { name, bug, summary, harm, scenes, sound: two_pass::EXACT, broken }
-}
-
 macro_rules! with {
     ($flaw:ident) => {
-        |stage| Box::new(Wrong::new(stage, Flaw::$flaw))
+        Rig { oracle: |stage| Box::new(Wrong::new(stage, Flaw::$flaw)), ..two_pass::EXACT }
     };
 }
 
 /// The faults.
 pub(super) const FAULTS: &[Fault] = &[
-    fault(
+    Fault::overdraws(
         ("short-clip-queue", 31),
         "clipped triangles do not fit the queue, and their part hides nothing",
-        (Harm::Overdraws, &["hard/near-plane", "hard/eye-on-box"]),
-        with!(ShortClipQueue),
+        &["hard/near-plane", "hard/eye-on-box"],
+        (two_pass::EXACT, with!(ShortClipQueue)),
     ),
-    fault(
+    Fault::drops(
         ("inverted-verdict", 32),
         "zero samples are taken for visible",
-        (Harm::Drops, &["hard/orthographic", "hard/layers"]),
-        with!(Inverted),
+        &["hard/orthographic", "hard/layers"],
+        (two_pass::EXACT, with!(Inverted)),
     ),
-    fault(
+    Fault::overdraws(
         ("scope-includes-next", 33),
         "a query's scope includes the next draw",
-        (Harm::Overdraws, &["hard/orthographic", "hard/layers"]),
-        with!(NextDraw),
+        &["hard/orthographic", "hard/layers"],
+        (two_pass::EXACT, with!(NextDraw)),
     ),
-    fault(
+    Fault::drops(
         ("slots-drift", 34),
         "drawn objects and query slots are one apart",
-        (Harm::Drops, &["hard/orthographic", "hard/layers"]),
-        with!(SlotsDrift),
+        &["hard/orthographic", "hard/layers"],
+        (two_pass::EXACT, with!(SlotsDrift)),
     ),
-    fault(
+    Fault::drops(
         ("recycled-slot", 35),
         "a recycled slot keeps its old verdict",
-        (Harm::Drops, &["hard/teleports", "hard/ping-pong"]),
-        with!(RecycledSlot),
+        &["hard/teleports", "hard/ping-pong"],
+        (two_pass::EXACT, with!(RecycledSlot)),
     ),
-    fault(
+    Fault::drops(
         ("tighter-query", 37),
         "the query draws less than the box that is tested",
-        (Harm::Drops, &["hard/orthographic", "hard/layers"]),
-        with!(TighterQuery),
+        &["hard/orthographic", "hard/layers"],
+        (two_pass::EXACT, with!(TighterQuery)),
     ),
-    fault(
+    Fault::drops(
         ("never-written", 41),
         "slots that were never written read as occluded",
-        (Harm::Drops, &["hard/orthographic", "hard/many"]),
-        with!(NeverWritten),
+        &["hard/orthographic", "hard/many"],
+        (two_pass::EXACT, with!(NeverWritten)),
     ),
-    fault(
+    Fault::overdraws(
         ("without-nearer", 57),
         "a question is answered against a buffer without the nearer one of its batch",
-        (Harm::Overdraws, &["hard/orthographic", "hard/layers"]),
-        with!(WithoutNearer),
+        &["hard/orthographic", "hard/layers"],
+        (two_pass::EXACT, with!(WithoutNearer)),
     ),
 ];

@@ -1,6 +1,6 @@
 //! Faults of what is remembered from frame to frame: the real `full` by broken rules of history.
 
-use super::{Fault, Harm, Rig, two_pass};
+use super::{Fault, Rig, two_pass};
 use crate::cull::ViewFrustum;
 use crate::cull::full::{Full, FullKnobs, HistoryRules};
 use crate::index::TwoLevelBsp;
@@ -40,42 +40,33 @@ pub(super) const VFC: Rig = Rig {
     ..FULL
 };
 
+macro_rules! by {
+    ($rules:ident) => {
+        Rig {
+            culler: |setup| Box::new(Full::<$rules>::by_rules(setup, FullKnobs::default())),
+            ..FULL
+        }
+    };
+}
+
 /// The faults.
 pub(super) const FAULTS: &[Fault] = &[
-    Fault {
-        name: "postponed-hides",
-        bug: 56,
-        summary: "a part whose question is postponed counts as invisible meanwhile",
-        harm: Harm::Drops,
-        scenes: &["hard/orthographic", "hard/layers"],
-        sound: FULL,
-        broken: Rig {
-            culler: |s| Box::new(Full::<PostponedHides>::by_rules(s, FullKnobs::default())),
-            ..FULL
-        },
-    },
-    Fault {
-        name: "streak-stays",
-        bug: 56,
-        summary: "the row of \"visible\" answers is not ended by \"hidden\", and questions wait too long",
-        harm: Harm::Overdraws,
-        scenes: &["hard/ping-pong", "hard/teleports"],
-        sound: FULL,
-        broken: Rig {
-            culler: |s| Box::new(Full::<StreakStays>::by_rules(s, FullKnobs::default())),
-            ..FULL
-        },
-    },
-    Fault {
-        name: "children-inherit",
-        bug: 60,
-        summary: "nodes below one that was hidden count as hidden when it comes into view",
-        harm: Harm::Drops,
-        scenes: &["hard/ping-pong", "hard/orthographic"],
-        sound: FULL,
-        broken: Rig {
-            culler: |s| Box::new(Full::<ChildrenInherit>::by_rules(s, FullKnobs::default())),
-            ..FULL
-        },
-    },
+    Fault::drops(
+        ("postponed-hides", 56),
+        "a part whose question is postponed counts as invisible meanwhile",
+        &["hard/orthographic", "hard/layers"],
+        (FULL, by!(PostponedHides)),
+    ),
+    Fault::overdraws(
+        ("streak-stays", 56),
+        "the row of \"visible\" answers is not ended by \"hidden\", and questions wait too long",
+        &["hard/ping-pong", "hard/teleports"],
+        (FULL, by!(StreakStays)),
+    ),
+    Fault::drops(
+        ("children-inherit", 60),
+        "nodes below one that was hidden count as hidden when it comes into view",
+        &["hard/ping-pong", "hard/orthographic"],
+        (FULL, by!(ChildrenInherit)),
+    ),
 ];

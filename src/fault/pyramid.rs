@@ -1,6 +1,6 @@
 //! Faults of hierarchical z: the real oracle by broken rules, asked by two-pass culling as in engines.
 
-use super::{Fault, Harm, MakeOracle, Rig, two_pass};
+use super::{Fault, Rig, two_pass};
 use crate::oracle::hierarchical_z::{HierarchicalZ, PyramidRules, Sound};
 
 /// The level below which no more than one texel is looked at: the logarithm rounded down.
@@ -99,70 +99,63 @@ impl PyramidRules for ThreadOffset {
     }
 }
 
-const fn fault(
-    (name, bug): (&'static str, u8),
-    summary: &'static str,
-    scenes: &'static [&'static str],
-    oracle: MakeOracle,
-) -> Fault {
-    let broken = Rig { oracle, ..two_pass::PYRAMID };
-    Fault { name, bug, summary, harm: Harm::Drops, scenes, sound: two_pass::PYRAMID, broken }
-}
-
 macro_rules! by {
     ($rules:ident) => {
-        |stage| Box::new(HierarchicalZ::<$rules>::by_rules(stage))
+        Rig {
+            oracle: |stage| Box::new(HierarchicalZ::<$rules>::by_rules(stage)),
+            ..two_pass::PYRAMID
+        }
     };
 }
 
 /// The faults.
 pub(super) const FAULTS: &[Fault] = &[
-    fault(
+    Fault::drops(
         ("floor-level", 1),
         "the level by the logarithm rounded down, and one look where the rectangle covers more",
         &["hard/layers", "hard/orthographic", "hard/pinholes"],
-        by!(FloorLevel),
+        (two_pass::PYRAMID, by!(FloorLevel)),
     ),
-    fault(
+    Fault::drops(
         ("odd-is-lost", 2),
         "levels of odd size lose their last row and column",
         &["hard/last-column"],
-        by!(OddIsLost),
+        (two_pass::PYRAMID, by!(OddIsLost)),
     ),
-    fault(
+    Fault::drops(
         ("wrong-ratio", 3),
         "the rectangle is scaled by the wrong ratio of pyramid to view",
         &["hard/layers", "hard/orthographic"],
-        by!(WrongRatio),
+        (two_pass::PYRAMID, by!(WrongRatio)),
     ),
-    fault(
+    Fault::drops(
         ("scaled-twice", 4),
         "the rectangle's size is scaled twice, and four looks miss its middle",
         &["hard/pinholes", "hard/orthographic"],
-        by!(ScaledTwice),
+        (two_pass::PYRAMID, by!(ScaledTwice)),
     ),
-    fault(
+    Fault::drops(
         ("filtered", 5),
         "level 0 through a filtering sampler: holes are no longer as deep as they are",
         &["hard/pinholes", "hard/grazing"],
-        by!(Filtered),
+        (two_pass::PYRAMID, by!(Filtered)),
     ),
-    fault(
+    Fault::drops(
         ("stale-source", 6),
         "the depth asked is still the one of the frame before",
         &["hard/ping-pong", "hard/teleports"],
-        by!(LastFrame),
+        (two_pass::PYRAMID, by!(LastFrame)),
     ),
-    fault(
+    Fault::drops(
         ("low-resolution", 27),
         "a coarse occlusion buffer closes thin gaps",
         &["hard/pinholes", "hard/grazing"],
-        by!(LowResolution),
+        (two_pass::PYRAMID, by!(LowResolution)),
     ),
-    fault(
+    Fault::drops(
         ("thread-offset", 29),
         "every second thread writes at a wrong offset, in large images alone",
         &["hard/orthographic", "hard/pinholes"],
-        by!(ThreadOffset),
+        (two_pass::PYRAMID, by!(ThreadOffset)),
     ),
 ];

@@ -3,7 +3,7 @@
 
 use glam::{DMat4, DVec4};
 
-use super::{Fault, Harm, MakeCuller, Rig, history};
+use super::{Fault, Rig, history};
 use crate::cull::{Culler, CullerSetup, Full, FullKnobs, ObjectView, Pen, View, ViewFrustum};
 use crate::math::ClipError;
 use crate::oracle::OracleError;
@@ -122,46 +122,39 @@ fn single_precision(_: &View<'_>, shown: &mut Shown, _: &mut Memory) {
     }
 }
 
-const fn fault(
-    (name, bug): (&'static str, u8),
-    summary: &'static str,
-    scenes: &'static [&'static str],
-    (sound, culler): (Rig, MakeCuller),
-) -> Fault {
-    let broken = Rig { culler, ..sound };
-    Fault { name, bug, summary, harm: Harm::Drops, scenes, sound, broken }
-}
-
 /// The faults.
 pub(super) const FAULTS: &[Fault] = &[
-    fault(
+    Fault::drops(
         ("taken-for-symmetric", 10),
         "an asymmetric frustum is taken for a symmetric one",
         &["hard/asymmetric", "hard/stereo"],
-        (history::FULL, |setup| full(setup, symmetric)),
+        (history::FULL, Rig { culler: |setup| full(setup, symmetric), ..history::FULL }),
     ),
-    fault(
+    Fault::drops(
         ("first-eye-for-all", 11),
         "one eye's frustum is used for both",
         &["hard/stereo", "hard/split-screen"],
-        (Rig { keeps_views: true, ..history::VFC }, |setup| vfc(setup, first_eye)),
+        (
+            history::VFC,
+            Rig { culler: |setup| vfc(setup, first_eye), keeps_views: true, ..history::VFC },
+        ),
     ),
-    fault(
+    Fault::drops(
         ("half-of-half-the-field", 13),
         "half the field of view is halved again",
         &["hard/orthographic", "hard/wide-angle", "hard/near-plane"],
-        (history::VFC, |setup| vfc(setup, half_of_half)),
+        (history::VFC, Rig { culler: |setup| vfc(setup, half_of_half), ..history::VFC }),
     ),
-    fault(
+    Fault::drops(
         ("old-boxes", 22),
         "things move and their boxes are those of the first frame",
         &["hard/stop-and-go", "hard/teleports"],
-        (history::FULL, |setup| full(setup, old_boxes)),
+        (history::FULL, Rig { culler: |setup| full(setup, old_boxes), ..history::FULL }),
     ),
-    fault(
+    Fault::drops(
         ("single-precision", 24),
         "matrices in single precision, a million units from the origin",
         &["hard/far-from-origin"],
-        (history::FULL, |setup| full(setup, single_precision)),
+        (history::FULL, Rig { culler: |setup| full(setup, single_precision), ..history::FULL }),
     ),
 ];

@@ -5,7 +5,7 @@
 
 use glam::{DVec3, DVec4};
 
-use super::{Fault, Harm, MakeCuller, Rig, two_pass};
+use super::{Fault, Rig, two_pass};
 use crate::cull::{Culler, CullerSetup, Pen, View};
 use crate::oracle::{Always, OracleError};
 use crate::part::ObjectId;
@@ -109,46 +109,36 @@ pub(super) const RIG: Rig = Rig {
     ..two_pass::EXACT
 };
 
-const fn fault(
-    (name, bug): (&'static str, u8),
-    summary: &'static str,
-    scenes: &'static [&'static str],
-    culler: MakeCuller,
-) -> Fault {
-    let broken = Rig { culler, ..RIG };
-    Fault { name, bug, summary, harm: Harm::Drops, scenes, sound: RIG, broken }
-}
-
 macro_rules! with {
     ($flaw:ident) => {
-        |_| Box::new(Spheres { flaw: Some(Flaw::$flaw) })
+        Rig { culler: |_| Box::new(Spheres { flaw: Some(Flaw::$flaw) }), ..RIG }
     };
 }
 
 /// The faults.
 pub(super) const FAULTS: &[Fault] = &[
-    fault(
+    Fault::drops(
         ("distance-in-radius", 14),
         "the plane's distance goes into the dot product that gives the radius",
         &["hard/far-from-origin", "hard/strays"],
-        with!(DistanceInRadius),
+        (RIG, with!(DistanceInRadius)),
     ),
-    fault(
+    Fault::drops(
         ("zero-normal", 15),
         "the far plane of an endless frustum has no normal and rejects everything",
         &["hard/infinite-far"],
-        with!(ZeroNormal),
+        (RIG, with!(ZeroNormal)),
     ),
-    fault(
+    Fault::drops(
         ("not-normalised", 16),
         "planes that are not normalised against radii that are lengths",
         &["hard/edge-of-view", "hard/telephoto"],
-        with!(NotNormalised),
+        (RIG, with!(NotNormalised)),
     ),
-    fault(
+    Fault::drops(
         ("not-rotated", 18),
         "the sphere's middle is moved with its object but not turned",
         &["hard/pivots"],
-        with!(NotRotated),
+        (RIG, with!(NotRotated)),
     ),
 ];

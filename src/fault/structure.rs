@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::{Fault, Harm, MakeIndex, Rig, history};
+use super::{Fault, Rig, history};
 use crate::index::{Entry, Index, Move, Node, NodeId, TwoLevelBsp};
 use crate::math::Aabb;
 use crate::part::{ObjectId, PartedMesh};
@@ -197,79 +197,66 @@ fn lose_fragments(mesh: &mut PartedMesh) {
     }
 }
 
-const fn fault(
-    (name, bug): (&'static str, u8),
-    summary: &'static str,
-    scenes: &'static [&'static str],
-    index: MakeIndex,
-) -> Fault {
-    let broken = Rig { index, ..history::FULL };
-    Fault { name, bug, summary, harm: Harm::Drops, scenes, sound: history::FULL, broken }
-}
-
 macro_rules! with {
     ($flaw:ident) => {
-        |entries| Box::new(Wrong::new(entries, Flaw::$flaw))
+        Rig { index: |entries| Box::new(Wrong::new(entries, Flaw::$flaw)), ..history::FULL }
     };
 }
 
 /// The faults.
 pub(super) const FAULTS: &[Fault] = &[
-    fault(
+    Fault::drops(
         ("root-sticks-out", 38),
         "things stick out of the root's box, which is asked about all the same",
         &["hard/strays", "hard/peeping"],
-        with!(SticksOut),
+        (history::FULL, with!(SticksOut)),
     ),
-    fault(
+    Fault::drops(
         ("same-container", 43),
         "an object whose middle is still in the same node is not looked at",
         &["hard/peeping", "hard/strays"],
-        with!(SameContainer),
+        (history::FULL, with!(SameContainer)),
     ),
-    fault(
+    Fault::drops(
         ("growth-drops", 44),
         "what stands outside is lost when the tree grows",
         &["hard/out-of-space", "hard/teleports"],
-        with!(Growth),
+        (history::FULL, with!(Growth)),
     ),
-    fault(
+    Fault::drops(
         ("respawn-breaks", 45),
         "freeing and spawning an object takes a neighbour out of the list",
         &["hard/teleports", "hard/out-of-space"],
-        with!(Respawn),
+        (history::FULL, with!(Respawn)),
     ),
-    fault(
+    Fault::drops(
         ("same-place", 47),
         "an object linked anew to the node where it hangs is taken out and not put in",
         &["hard/teleports", "hard/ping-pong"],
-        with!(SamePlace),
+        (history::FULL, with!(SamePlace)),
     ),
-    fault(
+    Fault::drops(
         ("too-many-leaves", 50),
         "an object in too many leaves is in none",
         &["hard/orthographic", "hard/layers"],
-        with!(TooManyLeaves),
+        (history::FULL, with!(TooManyLeaves)),
     ),
-    Fault {
-        name: "fragment-lost",
-        bug: 55,
-        summary: "a fragment is lost at the plane that split its triangle",
-        harm: Harm::Drops,
-        scenes: &["hard/t-junctions", "hard/layers"],
-        sound: history::FULL,
-        broken: Rig { alter: Some(lose_fragments), ..history::FULL },
-    },
-    fault(
+    Fault::drops(
+        ("fragment-lost", 55),
+        "a fragment is lost at the plane that split its triangle",
+        &["hard/t-junctions", "hard/layers"],
+        (history::FULL, Rig { alter: Some(lose_fragments), ..history::FULL }),
+    ),
+    Fault::drops(
         ("tight-kept", 58),
         "a tightened box is kept after the contents moved",
         &["hard/slits"],
-        with!(TightKept),
+        (history::FULL, with!(TightKept)),
     ),
-    fault(
+    Fault::drops(
         ("in-neither", 59),
         "a relinked object is left in neither node",
         &["hard/orthographic", "hard/stop-and-go"],
-        with!(Neither),
+        (history::FULL, with!(Neither)),
     ),
 ];

@@ -5,7 +5,7 @@
 
 use glam::{DMat4, DVec3};
 
-use super::{Fault, Harm, MakeCuller, Rig};
+use super::{Fault, Rig};
 use crate::cull::{Culler, CullerSetup, Pen, View};
 use crate::index::{Index, List};
 use crate::math::{Aabb, ClipBox, PixelRectangle, Projection};
@@ -252,101 +252,90 @@ pub(super) const PYRAMID: Rig = Rig {
     ..EXACT
 };
 
-/// A fault of this culler.
-const fn fault(
-    (name, bug): (&'static str, u8),
-    summary: &'static str,
-    scenes: &'static [&'static str],
-    culler: MakeCuller,
-) -> Fault {
-    let broken = Rig { culler, ..EXACT };
-    Fault { name, bug, summary, harm: Harm::Drops, scenes, sound: EXACT, broken }
-}
-
 macro_rules! with {
     ($flaw:ident) => {
-        |_| Box::new(TwoPass::new(Some(Flaw::$flaw)))
+        Rig { culler: |_| Box::new(TwoPass::new(Some(Flaw::$flaw))), ..EXACT }
     };
 }
 
 /// The faults.
 pub(super) const FAULTS: &[Fault] = &[
-    fault(
+    Fault::drops(
         ("late-offset", 7),
         "the second pass writes on where the last frame's ended, and runs off the end of its buffer",
         &["hard/many", "hard/ping-pong"],
-        with!(LateOffset),
+        (EXACT, with!(LateOffset)),
     ),
-    fault(
+    Fault::drops(
         ("euclidean-nearest", 8),
         "the nearest point by Euclidean distance, compared as view depth",
         &["hard/behind-a-gap", "hard/wide-angle"],
-        with!(EuclideanNearest),
+        (EXACT, with!(EuclideanNearest)),
     ),
-    fault(
+    Fault::drops(
         ("near-plane", 12),
         "a box with a corner behind the near plane counts as outside",
         &["hard/near-plane", "hard/eye-on-box"],
-        with!(NearPlane),
+        (EXACT, with!(NearPlane)),
     ),
-    fault(
+    Fault::drops(
         ("fails-closed", 17),
         "a box that cannot be projected counts as outside",
         &["hard/eye-on-plane", "hard/eye-on-box"],
-        with!(FailsClosed),
+        (EXACT, with!(FailsClosed)),
     ),
-    fault(
+    Fault::drops(
         ("not-a-number", 17),
         "a matrix without an inverse gives a distance that is no number, which fails closed",
         &["hard/collapsed"],
-        with!(NotANumber),
+        (EXACT, with!(NotANumber)),
     ),
-    fault(
+    Fault::drops(
         ("two-corners", 19),
         "the box in the world is that of two corners carried over: inside out under negative scale",
         &["hard/scales"],
-        with!(TwoCorners),
+        (EXACT, with!(TwoCorners)),
     ),
-    fault(
+    Fault::drops(
         ("flat-is-empty", 23),
         "a box without volume counts as empty",
         &["hard/flat", "hard/pinholes"],
-        with!(FlatIsEmpty),
+        (EXACT, with!(FlatIsEmpty)),
     ),
-    fault(
+    Fault::drops(
         ("tiny-by-diagonal", 25),
         "what is smaller than a pixel by its diagonal counts as showing nothing",
         &["hard/specks"],
-        with!(TinyByDiagonal),
+        (EXACT, with!(TinyByDiagonal)),
     ),
-    fault(
+    Fault::drops(
         ("late-answer", 36),
         "the last frame's answer decides after the geometry has changed",
         &["hard/teleports", "hard/ping-pong"],
-        with!(LateAnswer),
+        (EXACT, with!(LateAnswer)),
     ),
-    fault(
+    Fault::drops(
         ("sticks-out", 38),
         "geometry sticks out of the box that is asked about",
         &["hard/orthographic", "hard/layers"],
-        with!(SticksOut),
+        (EXACT, with!(SticksOut)),
     ),
-    fault(
+    Fault::drops(
         ("untransformed", 39),
         "what moves is tested where its mesh was made",
         &["hard/stop-and-go", "hard/orthographic"],
-        with!(Untransformed),
+        (EXACT, with!(Untransformed)),
     ),
-    fault(
+    Fault::drops(
         ("other-view", 52),
         "one camera's verdict overrides another's",
         &["hard/stereo", "hard/split-screen"],
-        with!(OtherView),
+        (EXACT, with!(OtherView)),
     ),
-    fault(
+    Fault::drops(
         ("exempt-vanishes", 54),
         "an object that is exempt from culling is in neither list",
         &["hard/orthographic", "hard/layers"],
-        with!(ExemptVanishes),
+        (EXACT, with!(ExemptVanishes)),
     ),
 ];
