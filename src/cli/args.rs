@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use plainsight_reference::fast::{Options, SimdLevel};
 
+use super::export::ExportArgs;
 use super::faults::FaultsArgs;
+use super::judge::JudgeArgs;
 use super::why::WhyArgs;
 use crate::cull::ProxyKind;
 use crate::oracle::{MIB, MemoryKnobs};
@@ -40,6 +42,10 @@ pub(super) enum Verb {
     Compare(CompareArgs),
     /// Measure what work costs a device and write the file that `--cost` reads.
     Calibrate(CalibrateArgs),
+    /// Write a scene for cullers of other engines: meshes, frames, part ids.
+    Export(ExportArgs),
+    /// Judge what a culler of another engine drew.
+    Judge(JudgeArgs),
     /// Say what decided over one part in one frame, and draw it.
     Why(WhyArgs),
     /// Put the gate itself on trial: every seeded fault must be caught.
@@ -144,6 +150,9 @@ pub(super) struct RunArgs {
     /// Also write the JSON lines to this file.
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
+    /// Also write the results as JUnit XML to this file.
+    #[arg(long, value_name = "FILE.xml")]
+    pub(super) junit: Option<PathBuf>,
 }
 
 #[derive(Args, Clone)]

@@ -5,7 +5,9 @@
 mod args;
 mod calibrate;
 mod compare;
+mod export;
 mod faults;
+mod judge;
 mod list;
 mod picture;
 mod progress;
@@ -104,6 +106,8 @@ pub fn main(
         args::Verb::Picture(args) => picture::picture(&args, cullers, &mut streams),
         args::Verb::Compare(args) => compare::compare(&args, cullers, &mut streams),
         args::Verb::Calibrate(args) => calibrate::calibrate(&args, &mut streams),
+        args::Verb::Export(args) => export::export(&args, &mut streams),
+        args::Verb::Judge(args) => judge::judge(&args, &mut streams),
         args::Verb::Why(args) => why::why(&args, cullers, &mut streams),
         args::Verb::Faults(args) => faults::faults(&args, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),

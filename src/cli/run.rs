@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use indicatif::ProgressBar;
 
 use super::args::{RunArgs, SceneArgs, quoted};
+use super::judge::{failure_lines, junit_case};
 use super::progress::{counting_triangles, progress_bar};
 use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
 use crate::check::Gate;
@@ -14,7 +15,7 @@ use crate::index::{Entry, INDEXES, IndexKind};
 use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
 use crate::oracle::{Always, CostModel, HierarchicalZ, Oracle, OracleError, Questions, Sim, Stage};
 use crate::part::{Cache, PartId};
-use crate::report::{Row, table};
+use crate::report::{Row, junit, table};
 use crate::run::{
     FrameRecord, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World,
     partition_difference, run as run_lanes,
@@ -390,6 +391,7 @@ pub(super) fn run(
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
     let out = args.out.as_deref().map(OutFile::create).transpose()?;
+    let junit_file = args.junit.as_deref().map(OutFile::create).transpose()?;
     let names: Vec<&str> = if args.scene.is_empty() {
         DEFAULT_SCENES.to_vec()
     } else {
@@ -420,6 +422,7 @@ pub(super) fn run(
     catch_interrupt();
     let bar = progress_bar();
     let (mut rows, mut lines, mut failed) = (Vec::new(), String::new(), false);
+    let mut cases = Vec::new();
     for named in &scenes {
         let finished = plan.run(named, &bar, streams);
         if finished.is_err() {
@@ -434,6 +437,7 @@ pub(super) fn run(
                 bar.suspend(|| writeln!(streams.out, "{line}"))?;
             }
             lines += &format!("{line}\n");
+            cases.push(junit_case(&row, failure_lines(gate, trace)));
             rows.push(row);
             failed |= !gate.held();
             bar.suspend(|| tell_failures(gate, trace, streams))?;
@@ -446,6 +450,9 @@ pub(super) fn run(
     }
     if let Some(out) = out {
         out.finish(lines.as_bytes())?;
+    }
+    if let Some(file) = junit_file {
+        file.finish(junit(&cases).as_bytes())?;
     }
     Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
 }

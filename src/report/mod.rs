@@ -5,6 +5,7 @@ mod account;
 mod chart;
 mod columns;
 mod comparison;
+mod junit;
 mod memory;
 mod picture;
 mod row;
@@ -13,6 +14,7 @@ pub use account::{account_picture, decision_line, item_name, step_line, truth_li
 pub use chart::{Chart, Series};
 pub use columns::wrapped;
 pub use comparison::{Comparison, Published, TABLE_1};
+pub use junit::{JunitCase, junit};
 pub use memory::MemoryFigures;
 pub use picture::{Shown, depth_picture, part_picture, picture_png, top_view};
 pub use row::{JSON_SCHEMA, Row, table};

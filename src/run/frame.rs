@@ -95,6 +95,15 @@ impl World {
         self.effects.moving().len()
     }
 
+    /// Where an object stands at frame `t`: the affine matrix from its space to the world.
+    ///
+    /// # Panics
+    /// For an object that does not exist.
+    #[must_use]
+    pub fn world_from_object(&self, object: ObjectId, t: u32) -> DMat4 {
+        self.effects.placement(object.0, t).world_from_object()
+    }
+
     /// What its oracles work on.
     #[must_use]
     pub fn stage(&self) -> Stage {
@@ -144,7 +153,7 @@ impl FrameState {
         let clip_from_world = camera.clip_from_world(world.scene.viewport);
         let objects: Vec<ObjectView> = (0..world.scene.objects.len() as u32)
             .map(|object| {
-                let world_from_object = world.effects.placement(object, t).world_from_object();
+                let world_from_object = world.world_from_object(ObjectId(object), t);
                 let bounds = world.partition.mesh(ObjectId(object)).bounds;
                 let reach = if bounds.is_empty() { DVec3::ZERO } else { bounds.max_abs() };
                 ObjectView {

@@ -184,7 +184,7 @@ fn draw_visible(
 }
 
 /// What a trace keeps of the truth: visible parts, their triangles, the image's hash.
-fn truth_facts(truth: &Truth) -> (u32, u64, u64) {
+pub(super) fn truth_facts(truth: &Truth) -> (u32, u64, u64) {
     (truth.visible_parts, truth.visible_triangles, truth.hash)
 }
 

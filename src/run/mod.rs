@@ -6,6 +6,7 @@ mod account;
 mod calibrate;
 mod frame;
 mod lane;
+mod told;
 mod trace;
 mod truth;
 
@@ -13,6 +14,7 @@ pub use account::{Account, Made, PartTruth, Step, account};
 pub use calibrate::{Bench, CalibrationKnobs, Workload, frames_to_measure, measure, workloads};
 pub use frame::{FrameState, World};
 pub use lane::{Lane, LaneInfo, Observer, Repeat, RunError, run};
+pub use told::told;
 pub use trace::{DeviceImages, FrameRecord, FrameTrace, Moment, Trace};
 pub use truth::{Truth, depth_complexity, fates_of_parts, partition_difference, render};
 

@@ -9,6 +9,7 @@ mod common;
 mod compare;
 mod determinism;
 mod faults;
+mod foreign;
 mod golden;
 mod hard;
 mod held;
