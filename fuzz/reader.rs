@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use plainsight::foreign::{Drawn, ForeignError};
 use plainsight::part::PartitionKnobs;
 use plainsight::run::{FrameState, Moment, World};
 use plainsight::scene::generate::Knobs;
@@ -30,6 +31,23 @@ pub(super) fn model(format: Format, bytes: &[u8]) {
             let _: Vec<Mesh> = meshes;
         }
         Err(error) => one_line(&error),
+    }
+}
+
+/// Reads `bytes` as what a culler of another engine drew in two frames of two views of nine parts.
+pub(super) fn drawn(bytes: &[u8]) {
+    let mut drawn = Drawn::new(bytes, "drawn.jsonl");
+    let mut all = || -> Result<(), ForeignError> {
+        let name = drawn.header()?;
+        assert!(!name.chars().any(char::is_control));
+        for (frame, view) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let parts = drawn.at(Moment { frame, view }, 9)?;
+            assert!(parts.iter().all(|part| part.0 < 9));
+        }
+        drawn.end()
+    };
+    if let Err(error) = all() {
+        one_line(&error.to_string());
     }
 }
 

@@ -22,6 +22,8 @@ const SCENE: &str = "version = 1\nframes = 3\nviewport = [64, 48]\nleaf_triangle
     [camera_path]\nposes = [{ eye = [0,0,5], target = [0,0,0] }]\ntravel = \"jump\"\n\
     fov_y_degrees = 60\nshift = [0.1, 0]\nnear = 0.1\nfar = inf\n";
 
+const DRAWN: &str = include_str!("../../fuzz/corpus/drawn/good");
+
 /// One to four changes: a byte changed, a stretch left out, doubled, or cut off.
 fn spoil(good: &[u8], stream: &mut Stream) -> Vec<u8> {
     let mut bytes = good.to_vec();
@@ -56,13 +58,16 @@ fn read(name: &str, bytes: &[u8]) {
         "obj" => reader::model(Format::Obj, bytes),
         "ply" => reader::model(Format::Ply, bytes),
         "gltf" => reader::model(Format::Gltf, bytes),
+        "drawn" => reader::drawn(bytes),
         _ => reader::scene(bytes),
     }
 }
 
 #[test]
 fn spoilt_files_are_refused_in_a_line_or_read() {
-    for (name, good) in [("obj", OBJ), ("ply", PLY), ("gltf", GLTF), ("scene", SCENE)] {
+    for (name, good) in
+        [("obj", OBJ), ("ply", PLY), ("gltf", GLTF), ("scene", SCENE), ("drawn", DRAWN)]
+    {
         read(name, good.as_bytes());
         let mut stream = Stream::new(1, name);
         for _ in 0..SPOILT {
@@ -86,7 +91,7 @@ fn the_good_files_are_good() {
 
 #[test]
 fn what_a_fuzzer_kept() {
-    for name in ["obj", "ply", "gltf", "scene"] {
+    for name in ["obj", "ply", "gltf", "scene", "drawn"] {
         let folder = format!("{}/fuzz/corpus/{name}", env!("CARGO_MANIFEST_DIR"));
         let mut paths: Vec<_> =
             std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
