@@ -104,7 +104,8 @@ impl<'a> Drawn<'a> {
         };
         let header: Header = self.parse(&text, FORM)?;
         if header.plainsight != "drawn" {
-            let format = header.plainsight;
+            let format: String = header.plainsight.chars().take(24).collect();
+            let format = format.escape_debug();
             return self.refuse(format!("is of the format '{format}'; write {FORM}"));
         }
         if header.version != VERSION {

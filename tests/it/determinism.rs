@@ -34,7 +34,7 @@ fn threads_and_repetition_leave_the_same_hash() {
     }
 }
 
-/// The same numbers in every build profile: this snapshot is compared by debug and release tests.
+/// The same numbers in every build profile: `tests/release.sh` holds the release build to this snapshot.
 #[test]
 fn hashes_are_the_same_in_every_profile() {
     let lines: Vec<String> =
