@@ -75,9 +75,17 @@ fn a_dropped_part_is_caught_and_replays() {
         assert!(talk.contains("set: frame 7 part "), "{talk}");
         let why = talk.lines().find_map(|line| line.trim().strip_prefix("why: ")).unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let (code, out, talk) = run(&format!("{why} --out {}/why.png", folder.path().display()));
-        assert_eq!(code, EXIT_HELD, "{out}{talk}");
+        let (code, out, told) = run(&format!("{why} --out {}/why.png", folder.path().display()));
+        assert_eq!(code, EXIT_HELD, "{out}{told}");
         assert!(out.contains("truth: visible in ") && out.contains("\nculled; "), "{out}");
+        // The pixel that is named shows that part, and so it is found by its pixel as well.
+        let (what, part) = why.rsplit_once(" --part ").unwrap();
+        let pixel = talk.split(&format!("set: frame 7 part {part} is visible in ")).nth(1).unwrap();
+        let pixel = pixel.split(['(', ')']).nth(1).unwrap().replace(' ', "");
+        let file = folder.path().join("pixel.png");
+        let by_pixel = format!("{what} --pixel {pixel} --out {}", file.display());
+        let (_, by_pixel, _) = run(&by_pixel);
+        assert!(by_pixel.contains(&format!("frame 7, part {part}: ")), "{by_pixel}");
     }
 }
 

@@ -24,6 +24,21 @@ pub(crate) fn gpu() -> &'static Arc<Gpu> {
     GPU.get_or_init(|| Gpu::open(None).unwrap_or_else(|error| panic!("{error}")))
 }
 
+/// The second device, a very different one. `tests/run.sh` fetches it and names both to the loader.
+pub(crate) fn swiftshader() -> &'static Arc<Gpu> {
+    static GPU: OnceLock<Arc<Gpu>> = OnceLock::new();
+    GPU.get_or_init(|| {
+        Gpu::open(Some("SwiftShader"))
+            .unwrap_or_else(|error| panic!("{error}; tests/run.sh fetches SwiftShader"))
+    })
+}
+
+/// The hardware oracle of a device.
+pub(crate) fn hardware(gpu: &Arc<Gpu>, world: &World) -> Box<dyn Oracle> {
+    let stage = GpuStage::new(gpu, &world.stage()).unwrap();
+    Box::new(Hardware::new(&stage, Questions::Queries).unwrap())
+}
+
 /// A world small enough for debug builds.
 pub(crate) fn world(scene: &str, seed: u64, scale: f64, frames: u32) -> World {
     let knobs = Knobs {
@@ -43,6 +58,14 @@ pub(crate) fn leaf_triangles(scene: &str) -> u32 {
     if scene == "powerplant" { 4096 } else { 256 }
 }
 
+/// The device and the way of asking that a name stands for; `swiftshader` is `hardware` on that one.
+fn device(name: &str) -> Option<(&'static Arc<Gpu>, Questions)> {
+    match name {
+        "swiftshader" => Some((swiftshader(), Questions::Queries)),
+        _ => Questions::of(name).map(|questions| (gpu(), questions)),
+    }
+}
+
 /// An oracle by name.
 pub(crate) fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
     let stage = world.stage();
@@ -51,8 +74,8 @@ pub(crate) fn oracle(name: &str, world: &World) -> Box<dyn Oracle> {
         "hierarchical-z" => Box::new(HierarchicalZ::new(stage)),
         "always" => Box::<Always>::default(),
         _ => {
-            let questions = Questions::of(name).expect("an oracle of that name");
-            let stage = GpuStage::new(gpu(), &stage).unwrap();
+            let (gpu, questions) = device(name).expect("an oracle of that name");
+            let stage = GpuStage::new(gpu, &stage).unwrap();
             Box::new(Hardware::new(&stage, questions).unwrap())
         }
     }
@@ -68,14 +91,16 @@ pub(crate) fn gates(
     proxy: ProxyKind,
 ) -> Vec<(Trace, Gate)> {
     let entries = world.entries();
-    let questions = Questions::of(oracle_name);
-    let stage = questions.map(|_| GpuStage::new(gpu(), &world.stage()).unwrap());
+    let device = device(oracle_name);
+    let stage = device.map(|(gpu, _)| GpuStage::new(gpu, &world.stage()).unwrap());
     let mut gates: Vec<Gate> = Vec::new();
     gates.resize_with(cullers.len(), Gate::default);
     let mut lanes: Vec<Lane<'_>> = Vec::new();
     for (culler, gate) in cullers.iter().zip(&mut gates) {
-        let oracle = match (questions, &stage) {
-            (Some(questions), Some(stage)) => Box::new(Hardware::new(stage, questions).unwrap()),
+        let oracle = match (device, &stage) {
+            (Some((_, questions)), Some(stage)) => {
+                Box::new(Hardware::new(stage, questions).unwrap())
+            }
             _ => oracle(oracle_name, world),
         };
         let make = || {

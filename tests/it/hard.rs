@@ -25,6 +25,26 @@ fn worlds(most: u32) -> impl Iterator<Item = World> {
     })
 }
 
+/// A very different device: its tolerance is wide, and may be made use of.
+#[test]
+fn cullers_hold_on_a_second_device() {
+    let few: Vec<CullerKind> = CULLERS
+        .iter()
+        .filter(|culler| ["full", "chc++", "full-adaptive"].contains(&culler.name))
+        .copied()
+        .collect();
+    let mut failures = Vec::new();
+    for world in worlds(FEW_FRAMES) {
+        for (trace, gate) in gates(&world, &few, INDEXES[0], "swiftshader", ProxyKind::Rectangle) {
+            if !gate.held() {
+                let (scene, culler) = (&world.scene.name, &trace.lane.culler);
+                failures.push(format!("{scene} {culler}: {}", gate.failures().join("; ")));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
 /// Every culler holds in every scene, and none makes use of the device's tolerance.
 fn hold(cullers: &[CullerKind], (oracle, frames): (&str, u32), index: IndexKind, proxy: ProxyKind) {
     let mut failures = Vec::new();
