@@ -41,11 +41,7 @@ pub use simple::Simple;
 pub use view::{ObjectView, View};
 pub use view_frustum::ViewFrustum;
 
-/// Which stand-in is asked about. Each has the proof that it is conservative where its margin stands
-/// (`math::clip_box`, `math::hull`, `math::inflate`), and `tests/it/proxies.rs` attacks it. What each lets
-/// pass, parts drawn by `simple` where so many are visible, scenes at scale 0.3: bunnies 198, 191 and 188
-/// for 155; city 54.8, 54.2 and 54.8 for 46.8; rooms 46.2, 46.2 and 46.1 for 26.8. On lavapipe a hull or a
-/// box takes about as long as a rectangle.
+/// Which stand-in is asked about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ProxyKind {
     /// The projected corners' rectangle at the nearest depth: the provable one.

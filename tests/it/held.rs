@@ -40,9 +40,6 @@ fn pairings() -> Vec<(IndexKind, &'static str, ProxyKind)> {
             pairings.push((index, oracle, ProxyKind::Rectangle));
             if ["sim", "hardware"].contains(&oracle) {
                 pairings.push((index, oracle, ProxyKind::Box));
-                if place == 0 {
-                    pairings.push((index, oracle, ProxyKind::Hull));
-                }
             }
         }
     }

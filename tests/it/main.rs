@@ -19,7 +19,6 @@ mod margins;
 mod memory;
 mod oracle;
 mod partition;
-mod proxies;
 mod readers;
 mod snapshots;
 mod tidy;
