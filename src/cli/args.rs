@@ -291,8 +291,6 @@ pub(super) enum PartsArg {
 pub(super) enum ProxyArg {
     /// The projected corners' rectangle at the nearest depth.
     Rectangle,
-    /// Their convex hull at the nearest depth.
-    Hull,
     /// The inflated box with interpolated depth.
     Box,
 }
@@ -301,7 +299,6 @@ impl From<ProxyArg> for ProxyKind {
     fn from(proxy: ProxyArg) -> Self {
         match proxy {
             ProxyArg::Rectangle => Self::Rectangle,
-            ProxyArg::Hull => Self::Hull,
             ProxyArg::Box => Self::Box,
         }
     }
@@ -392,12 +389,7 @@ impl SceneArgs {
         add("leaf", self.leaf.map(|leaf| leaf.to_string()));
         add("parts", (self.parts == PartsArg::Whole).then(|| "whole".to_owned()));
         add("index", (self.index != "two-level-bsp").then(|| self.index.clone()));
-        let proxy = match self.proxy {
-            ProxyArg::Rectangle => None,
-            ProxyArg::Hull => Some("hull"),
-            ProxyArg::Box => Some("box"),
-        };
-        add("proxy", proxy.map(str::to_owned));
+        add("proxy", (self.proxy == ProxyArg::Box).then(|| "box".to_owned()));
         add("memory", self.memory.map(|mib| mib.to_string()));
         add("prefetch", self.prefetch.map(|mib| mib.to_string()));
         add("cost", (self.cost != "lavapipe").then(|| self.cost.clone()));

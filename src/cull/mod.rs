@@ -47,8 +47,6 @@ pub enum ProxyKind {
     /// The projected corners' rectangle at the nearest depth: the provable one.
     #[default]
     Rectangle,
-    /// The projected corners' convex hull, at the nearest depth: provable likewise, and tighter.
-    Hull,
     /// The box itself, inflated, with interpolated depth.
     Box,
 }

@@ -116,19 +116,10 @@ impl<'a> Pen<'a> {
         self.note(2, u64::from(query.0));
         for proxy in proxies {
             self.counts.pixels += proxy.pixels();
-            match proxy {
-                Proxy::Rectangle { min, max, depth } => {
-                    self.note(3, u64::from(min[0]) << 32 | u64::from(min[1]));
-                    self.note(3, u64::from(max[0]) << 32 | u64::from(max[1]));
-                    self.note(3, u64::from(depth.to_bits()));
-                }
-                Proxy::Hull { hull, depth } => {
-                    for [x, y] in hull.corners() {
-                        self.note(5, u64::from(x.to_bits()) << 32 | u64::from(y.to_bits()));
-                    }
-                    self.note(5, u64::from(depth.to_bits()));
-                }
-                Proxy::Box { .. } => {}
+            if let Proxy::Rectangle { min, max, depth } = proxy {
+                self.note(3, u64::from(min[0]) << 32 | u64::from(min[1]));
+                self.note(3, u64::from(max[0]) << 32 | u64::from(max[1]));
+                self.note(3, u64::from(depth.to_bits()));
             }
         }
         query

@@ -314,7 +314,6 @@ impl Scenery {
                 let plain = Proxy::Rectangle { min, max, depth };
                 let proxy = match self.proxy {
                     ProxyKind::Rectangle => plain,
-                    ProxyKind::Hull => Self::hull_proxy(view, &clip, rectangle, depth),
                     ProxyKind::Box => self.node_box_proxy(view, item).unwrap_or(plain),
                 };
                 Appearance::Ask { rectangle, depth, proxy }
@@ -411,19 +410,11 @@ impl Scenery {
                 let plain = Proxy::Rectangle { min, max, depth };
                 out.push(match self.proxy {
                     ProxyKind::Rectangle => plain,
-                    ProxyKind::Hull => Self::hull_proxy(view, &clip, rectangle, depth),
                     ProxyKind::Box => Self::box_proxy(view, object, aabb).unwrap_or(plain),
                 });
                 true
             }
         }
-    }
-
-    /// The hull, or the rectangle where there is none.
-    fn hull_proxy(view: &View<'_>, clip: &ClipBox, rectangle: PixelRectangle, depth: f32) -> Proxy {
-        let PixelRectangle { min, max } = rectangle;
-        clip.hull(view.viewport.width, view.viewport.height, &rectangle)
-            .map_or(Proxy::Rectangle { min, max, depth }, |hull| Proxy::Hull { hull, depth })
     }
 
     /// The inflated box of an object's node; scene nodes keep the rectangle.

@@ -15,7 +15,7 @@
 
 use glam::{DMat4, DVec4};
 
-use super::{Aabb, ClipError, HULL_DILATION_PIXELS, Hull};
+use super::{Aabb, ClipError};
 use crate::math::clip_error::absolute;
 
 /// Dilation of a projected box beyond its transform bound, for window arithmetic (2⁻⁷ pixel) and for
@@ -126,22 +126,6 @@ impl ClipBox {
     pub fn inside_frustum(&self) -> bool {
         let inside = |c: &DVec4| c.x.abs() <= c.w && c.y.abs() <= c.w && 0.0 <= c.z && c.z <= c.w;
         self.corners.iter().all(inside)
-    }
-
-    /// The hull of the contents in the same viewport, where [`ClipBox::project`] has found them within
-    /// `rectangle`. `None` where the rectangle must stand in.
-    #[must_use]
-    pub fn hull(&self, width: u32, height: u32, rectangle: &PixelRectangle) -> Option<Hull> {
-        let [ex, ey, _, ew] = self.error;
-        let w_min = self.corners.iter().fold(f64::INFINITY, |w, c| w.min(c.w)) - ew;
-        let half = [width, height].map(|pixels| f64::from(pixels) * 0.5);
-        let ratios = self.corners.map(|c| [c.x / c.w, c.y / c.w]);
-        let margin = |axis: usize, e: f64| {
-            let reach = ratios.iter().fold(0.0_f64, |reach, ratio| reach.max(ratio[axis].abs()));
-            (e + reach * ew) / w_min * half[axis] + HULL_DILATION_PIXELS
-        };
-        let points = ratios.map(|[x, y]| [x * half[0] + half[0], half[1] - y * half[1]]);
-        Hull::new(&points, [margin(0, ex), margin(1, ey)], rectangle)
     }
 
     /// The rectangle and nearest depth of the contents in a viewport of `width` × `height` pixels.

@@ -4,7 +4,6 @@
 mod aabb;
 mod clip_box;
 mod clip_error;
-mod hull;
 mod inflate;
 mod trig;
 
@@ -13,6 +12,5 @@ pub use clip_box::{
     ClipBox, DEPTH_ROUNDING, FrustumPlane, PixelRectangle, Projection, RECTANGLE_DILATION_PIXELS,
 };
 pub use clip_error::{CLIP_ERROR_GAMMA, ClipError, rounded_clip_matrix};
-pub use hull::{HULL_DILATION_PIXELS, Hull, MOST_CORNERS};
 pub use inflate::{BOX_DEPTH_SLACK, inflated_box};
 pub use trig::{cos, sin, tan};

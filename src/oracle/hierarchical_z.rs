@@ -11,8 +11,7 @@
 //!    the rectangle's corners, so four looks are enough.
 //!
 //! Its depth is the reference's, so what it may add to `sim` is only "visible". It loses where rectangles
-//! are large or straddle texels. A hull is asked about by the rectangle
-//! about it; a box counts as visible unasked.
+//! are large or straddle texels. A box is no rectangle: it counts as visible unasked.
 
 use std::marker::PhantomData;
 
@@ -197,10 +196,6 @@ impl<R: PyramidRules> Oracle for HierarchicalZ<R> {
         }
         let visible = proxies.iter().any(|proxy| match *proxy {
             Proxy::Rectangle { min, max, depth } => self.pyramid.may_show(min, max, depth),
-            // The rectangle about it holds more.
-            Proxy::Hull { hull, depth } => hull
-                .rectangle()
-                .is_some_and(|within| self.pyramid.may_show(within.min, within.max, depth)),
             Proxy::Box { .. } => true,
         });
         self.answers.answer(visible)

@@ -26,7 +26,6 @@ use std::sync::Arc;
 use plainsight_reference::Tolerance;
 use plainsight_reference::fast::Options;
 
-use crate::math::Hull;
 use crate::part::{PartId, Partition};
 use crate::scene::Viewport;
 
@@ -50,7 +49,6 @@ pub struct FrameView<'a> {
 
 /// The conservative stand-in that is asked about in place of geometry.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(clippy::large_enum_variant)] // most are of one kind, and they are never kept in numbers
 pub enum Proxy {
     /// A rectangle of whole pixels, columns `min[0]..max[0]`, rows `min[1]..max[1]` (row 0 on top),
     /// within the viewport and not empty, at one depth in [0, 1].
@@ -59,13 +57,6 @@ pub enum Proxy {
         min: [u32; 2],
         /// One beyond the last column and row.
         max: [u32; 2],
-        /// Depth of every sample.
-        depth: f32,
-    },
-    /// A convex polygon of window space, at one depth in [0, 1].
-    Hull {
-        /// The polygon, which covers the samples within it.
-        hull: Hull,
         /// Depth of every sample.
         depth: f32,
     },
@@ -81,15 +72,13 @@ pub enum Proxy {
 }
 
 impl Proxy {
-    /// Samples that it covers, for a hull about so many; 0 for a box, whose fill is not known before it is
-    /// projected.
+    /// Samples that it covers; 0 for a box, whose fill is not known before it is projected.
     #[must_use]
     pub fn pixels(&self) -> u64 {
         match self {
             Self::Rectangle { min, max, .. } => {
                 u64::from(max[0] - min[0]) * u64::from(max[1] - min[1])
             }
-            Self::Hull { hull, .. } => hull.area() as u64,
             Self::Box { .. } => 0,
         }
     }

@@ -127,9 +127,6 @@ impl Oracle for Sim {
         self.flush();
         let any = |proxy: &Proxy| match *proxy {
             Proxy::Rectangle { min, max, depth } => self.image.any_rectangle(min, max, depth),
-            Proxy::Hull { hull, depth } => hull
-                .rows()
-                .any(|(row, from, to)| self.image.any_rectangle([from, row], [to, row + 1], depth)),
             Proxy::Box { clip_from_box, min, max } => {
                 let (positions, triangles) = box_triangles(min, max);
                 let ranks: [u32; 12] = std::array::from_fn(|i| i as u32);

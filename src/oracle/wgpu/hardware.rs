@@ -11,7 +11,6 @@ use super::read_back::{DepthReader, MOST_COPIES};
 use super::redraw::encode_redraw;
 use super::slot::{Need, QUERIES_PER_PASS, RESULT_BYTES, Slot};
 use super::stage::{DrawnObject, GpuParts, GpuStage};
-use crate::math::Hull;
 use crate::oracle::{
     Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, Questions, ReadBack, Residency,
     Step, box_proxy_triangles,
@@ -356,13 +355,6 @@ impl Hardware {
                 Proxy::Rectangle { min, max, depth } => {
                     self.asks.push(Ask { low: min, high: max, depth, question });
                 }
-                Proxy::Hull { hull, depth } => {
-                    // The rectangle about it holds more; about none the answer is "hidden".
-                    if let Some(within) = hull.rectangle() {
-                        let (low, high) = (within.min, within.max);
-                        self.asks.push(Ask { low, high, depth, question });
-                    }
-                }
                 Proxy::Box { .. } => self.unasked.push(question),
             }
         }
@@ -492,22 +484,6 @@ fn rectangle(viewport: Viewport, min: [u32; 2], max: [u32; 2], depth: f32) -> [[
     [a, b, c, a, c, d]
 }
 
-/// A hull as a fan of triangles in clip space. Its margin has room for what rounding, the device's window
-/// arithmetic and snapping make of the corners; neighbours share theirs bit for bit.
-fn hull_triangles(
-    viewport: Viewport,
-    hull: &Hull,
-    depth: f32,
-) -> impl Iterator<Item = [f32; 4]> + '_ {
-    let clip = move |[x, y]: [f32; 2]| {
-        let across = f64::from(x) * 2.0 / f64::from(viewport.width) - 1.0;
-        let down = 1.0 - f64::from(y) * 2.0 / f64::from(viewport.height);
-        [across as f32, down as f32, depth, 1.0]
-    };
-    let corners = hull.corners();
-    corners[1..].windows(2).flat_map(move |two| [corners[0], two[0], two[1]]).map(clip)
-}
-
 impl Oracle for Hardware {
     fn name(&self) -> &'static str {
         self.questions.name()
@@ -575,10 +551,6 @@ impl Oracle for Hardware {
                 Proxy::Rectangle { min, max, depth } => {
                     let viewport = self.stage.stage.viewport;
                     self.proxy_vertices.extend(rectangle(viewport, min, max, depth));
-                }
-                Proxy::Hull { hull, depth } => {
-                    let viewport = self.stage.stage.viewport;
-                    self.proxy_vertices.extend(hull_triangles(viewport, &hull, depth));
                 }
                 Proxy::Box { clip_from_box, min, max } => {
                     self.proxy_vertices.extend(box_proxy_triangles(&clip_from_box, min, max));
