@@ -45,6 +45,8 @@ pub enum ProxyKind {
     /// The projected corners' rectangle at the nearest depth: the provable one.
     #[default]
     Rectangle,
+    /// The convex hull of the projected corners at that depth.
+    Hull,
     /// The box itself, inflated, with interpolated depth.
     Box,
 }

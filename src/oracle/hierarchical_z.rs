@@ -10,7 +10,8 @@
 //! 3. Visible if any of them is at or beyond the rectangle's depth.
 //!
 //! Its depth is the reference's, so what it may add to `sim` is only "visible". It loses where rectangles
-//! are large or straddle texels. A box is no rectangle: it counts as visible unasked.
+//! are large or straddle texels. A hull is asked about by the rectangle around it; a box counts as visible
+//! unasked.
 
 use super::batches::Batches;
 use super::{Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Sim, Stage};
@@ -125,7 +126,9 @@ impl Oracle for HierarchicalZ {
             self.stale = false;
         }
         let visible = proxies.iter().any(|proxy| match *proxy {
-            Proxy::Rectangle { min, max, depth } => self.pyramid.may_show(min, max, depth),
+            Proxy::Rectangle { min, max, depth } | Proxy::Hull { min, max, depth, .. } => {
+                self.pyramid.may_show(min, max, depth)
+            }
             Proxy::Box { .. } => true,
         });
         self.answers.answer(visible)
