@@ -49,7 +49,8 @@ fn every_culler_holds_over_every_index() {
 }
 
 #[test]
-fn every_culler_holds_with_boxes_and_by_pyramids() {
+fn every_culler_holds_with_hulls_boxes_and_by_pyramids() {
+    hold(CULLERS, ("sim", FEW_FRAMES), INDEXES[0], ProxyKind::Hull);
     hold(CULLERS, ("sim", FEW_FRAMES), INDEXES[0], ProxyKind::Box);
     // A pyramid is built for each round trip: not for those that make thousands.
     let many_trips = ["simple", "full-waits"];
@@ -61,4 +62,6 @@ fn every_culler_holds_with_boxes_and_by_pyramids() {
 #[test]
 fn every_culler_holds_on_the_real_device() {
     hold(CULLERS, ("hardware", FEW_FRAMES), INDEXES[0], ProxyKind::Rectangle);
+    let full = &CULLERS[..1];
+    hold(full, ("hardware", FEW_FRAMES), INDEXES[0], ProxyKind::Hull);
 }
