@@ -12,6 +12,11 @@
 //! the dilated bounds, bounds included, and no other sample can be covered.
 //! Depth at a sample is a convex combination of vertex depths and monotonically rounded, so it is
 //! never below the smallest vertex depth.
+//! Drawn, the rectangle is two triangles of one depth whose corners are corners of pixels. These snap to
+//! where they are, half a pixel from every sample, so that it covers its samples and no others. A device
+//! that interpolates depth by differences finds that depth exactly; one that adds three products of it
+//! in f32 may be off by what [`FLAT_DEPTH_STEP`](super::FLAT_DEPTH_STEP) says, of which the half of
+//! [`DEPTH_ROUNDING`] that the contents do not need covers three units of eight.
 
 use glam::{DMat4, DVec4};
 

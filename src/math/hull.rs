@@ -61,9 +61,9 @@ pub const HULL_SUBPIXELS: i32 = 256;
 /// corners stay within 2³⁰ and their products within i64, and f64 knows such a place to 2⁻³¹ pixel.
 const FARTHEST: f64 = (1 << 28) as f64;
 
-/// A convex polygon in the window: its corners in order round it, in units of 1/256 pixel from the top
-/// left corner of the viewport, rows going down. It lies within the viewport and has at least three
-/// corners; it may cover no sample.
+/// A convex polygon in the window: its corners in order round it, clockwise on the screen, in units of
+/// 1/256 pixel from the top left corner of the viewport, rows going down. It lies within the viewport and
+/// has at least three corners; it may cover no sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hull {
     corners: [[i32; 2]; MOST_HULL_CORNERS],
@@ -88,6 +88,18 @@ impl Hull {
         corners.iter().zip(next).map(term).sum::<i64>().unsigned_abs()
     }
 
+    /// Whether a place, in sub-pixels, is within or on an edge.
+    #[must_use]
+    pub fn holds(&self, [x, y]: [i32; 2]) -> bool {
+        let corners = self.corners();
+        let next = corners.iter().cycle().skip(1);
+        let wide = |from: i32, to: i32| i64::from(to) - i64::from(from);
+        corners
+            .iter()
+            .zip(next)
+            .all(|(a, b)| wide(a[0], b[0]) * wide(a[1], y) >= wide(a[1], b[1]) * wide(a[0], x))
+    }
+
     const EMPTY: Self = Self { corners: [[0; 2]; MOST_HULL_CORNERS], len: 0 };
 
     /// Appends a corner that is not the last one again; false where there is no room.
@@ -106,7 +118,8 @@ impl Hull {
     /// What of it is on the side of `at` along an axis that `keeps` says; `None` where there is no room.
     fn cut(&self, axis: usize, at: i32, keeps: impl Fn(i32) -> bool) -> Option<Self> {
         let mut kept = Self::EMPTY;
-        let mut from = *self.corners().last()?;
+        let Some(&last) = self.corners().last() else { return Some(kept) };
+        let mut from = last;
         for &to in self.corners() {
             if keeps(from[axis]) != keeps(to[axis]) && !kept.push(crossing(from, to, axis, at)) {
                 return None;
@@ -142,7 +155,7 @@ fn crossing(a: [i32; 2], b: [i32; 2], axis: usize, at: i32) -> [i32; 2] {
 pub enum Outline {
     /// No sample can be within.
     Nowhere,
-    /// The rectangle stands in: a corner is too far out for the grid, or the outline fills it.
+    /// The rectangle stands in: a corner is too far out for the grid, or the outline holds as many samples.
     Rectangle,
     /// Tighter than the rectangle.
     Within {
@@ -197,8 +210,12 @@ impl ClipBox {
         if hull.len < 3 {
             return Outline::Nowhere;
         }
-        let all = (0..2).map(|axis| (edge(max[axis]) - edge(min[axis])) as u64).product::<u64>();
-        if hull.twice_area() == 2 * all {
+        // A convex polygon that holds the middles of the pixels in all four corners holds all others.
+        let [columns, rows] = [0, 1].map(|axis| {
+            let middle = HULL_SUBPIXELS / 2;
+            [edge(min[axis]) + middle, edge(max[axis]) - middle]
+        });
+        if columns.into_iter().all(|x| rows.into_iter().all(|y| hull.holds([x, y]))) {
             return Outline::Rectangle;
         }
         let depth = floor_f32(f64::from(depth) - margins.flat_depth).max(0.0);

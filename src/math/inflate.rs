@@ -8,6 +8,14 @@
 //! in the last, so the point moved by d = (a − b·v) / (1 + b). A box grown by |d| on each axis holds
 //! every such point, and being convex in front of the eye it covers every sample of the contents at a
 //! depth no greater than theirs.
+//!
+//! What is drawn of the grown box has moved corners too. Its faces towards the eye are one sheet whose
+//! outline, like a hull's (`hull`), goes round the sample's place at a distance that those moves do not
+//! reach, so one of their triangles covers it; faces that a move turns to the other side are edge-on and
+//! add nothing, for both faces count. The weak place of the proof is depth: a device may evaluate the
+//! plane of a triangle anywhere within the pixel, and how far that is off has no bound for a face that is
+//! nearly edge-on ([`BOX_DEPTH_SLACK`]). The attack in `tests/it/proxies.rs` found no such case on the
+//! reference, which interpolates exactly.
 
 use glam::{DMat4, DVec3, DVec4};
 
