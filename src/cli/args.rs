@@ -291,6 +291,8 @@ pub(super) enum PartsArg {
 pub(super) enum ProxyArg {
     /// The projected corners' rectangle at the nearest depth.
     Rectangle,
+    /// The convex hull of the projected corners at that depth.
+    Hull,
     /// The inflated box with interpolated depth.
     Box,
 }
@@ -299,6 +301,7 @@ impl From<ProxyArg> for ProxyKind {
     fn from(proxy: ProxyArg) -> Self {
         match proxy {
             ProxyArg::Rectangle => Self::Rectangle,
+            ProxyArg::Hull => Self::Hull,
             ProxyArg::Box => Self::Box,
         }
     }
@@ -389,7 +392,14 @@ impl SceneArgs {
         add("leaf", self.leaf.map(|leaf| leaf.to_string()));
         add("parts", (self.parts == PartsArg::Whole).then(|| "whole".to_owned()));
         add("index", (self.index != "two-level-bsp").then(|| self.index.clone()));
-        add("proxy", (self.proxy == ProxyArg::Box).then(|| "box".to_owned()));
+        add(
+            "proxy",
+            match self.proxy {
+                ProxyArg::Rectangle => None,
+                ProxyArg::Hull => Some("hull".to_owned()),
+                ProxyArg::Box => Some("box".to_owned()),
+            },
+        );
         add("memory", self.memory.map(|mib| mib.to_string()));
         add("prefetch", self.prefetch.map(|mib| mib.to_string()));
         add("cost", (self.cost != "lavapipe").then(|| self.cost.clone()));

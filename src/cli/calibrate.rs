@@ -25,10 +25,9 @@ fn refused(args: &CalibrateArgs) -> Option<String> {
     if scene.memory.is_some() {
         return Some("--memory: a cost model has no price for loading; leave it out".to_owned());
     }
-    if scene.proxy == ProxyArg::Box {
+    if scene.proxy != ProxyArg::Rectangle {
         return Some(
-            "--proxy box: what a box covers is not known, so rectangles are measured; leave it out"
-                .to_owned(),
+            "--proxy: rectangles are measured, whose samples are known; leave it out".to_owned(),
         );
     }
     (scene.cost != "lavapipe").then(|| "--cost: a model is written here, none is read".to_owned())

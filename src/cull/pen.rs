@@ -12,8 +12,9 @@ pub struct Counts {
     pub queries: u64,
     /// Proxies in all questions; more than questions where some were asked about together.
     pub proxies: u64,
-    /// Samples of all rectangles asked about; one within two rectangles counts twice. A box counts
-    /// none: what it covers is known to the oracle alone. In no hash: the rectangles are.
+    /// Samples of all rectangles asked about; one within two rectangles counts twice. A hull counts its
+    /// area, a box none: what it covers is known to the oracle alone. In no hash: rectangles and hulls
+    /// are.
     pub pixels: u64,
     /// Triangles of the parts drawn.
     pub triangles: u64,
@@ -116,10 +117,18 @@ impl<'a> Pen<'a> {
         self.note(2, u64::from(query.0));
         for proxy in proxies {
             self.counts.pixels += proxy.pixels();
-            if let Proxy::Rectangle { min, max, depth } = proxy {
+            if let Proxy::Rectangle { min, max, depth } | Proxy::Hull { min, max, depth, .. } =
+                proxy
+            {
                 self.note(3, u64::from(min[0]) << 32 | u64::from(min[1]));
                 self.note(3, u64::from(max[0]) << 32 | u64::from(max[1]));
                 self.note(3, u64::from(depth.to_bits()));
+            }
+            if let Proxy::Hull { hull, .. } = proxy {
+                for corner in hull.corners() {
+                    let [x, y] = corner.map(|at| u64::from(at as u32));
+                    self.note(5, x << 32 | y);
+                }
             }
         }
         query

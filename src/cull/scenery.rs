@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::{CullerSetup, Pen, ProxyKind, View};
 use crate::index::{Index, NodeId};
-use crate::math::{self, Aabb, ClipBox, ClipError, PixelRectangle, Projection};
+use crate::math::{self, Aabb, ClipBox, ClipError, Outline, PixelRectangle, Projection};
 use crate::oracle::Proxy;
 use crate::part::{ObjectId, PartId, Partition};
 
@@ -310,13 +310,11 @@ impl Scenery {
             Projection::Nowhere => Appearance::Nowhere,
             Projection::Unbounded => Appearance::Certain,
             Projection::Within { rectangle, depth } => {
-                let PixelRectangle { min, max } = rectangle;
-                let plain = Proxy::Rectangle { min, max, depth };
-                let proxy = match self.proxy {
-                    ProxyKind::Rectangle => plain,
-                    ProxyKind::Box => self.node_box_proxy(view, item).unwrap_or(plain),
-                };
-                Appearance::Ask { rectangle, depth, proxy }
+                let boxed = || self.node_box_proxy(view, item);
+                match self.stand_in(view, &clip, (rectangle, depth), boxed) {
+                    Some(proxy) => Appearance::Ask { rectangle, depth, proxy },
+                    None => Appearance::Nowhere,
+                }
             }
         }
     }
@@ -406,15 +404,36 @@ impl Scenery {
             Projection::Nowhere => true,
             Projection::Unbounded => false,
             Projection::Within { rectangle, depth } => {
-                let PixelRectangle { min, max } = rectangle;
-                let plain = Proxy::Rectangle { min, max, depth };
-                out.push(match self.proxy {
-                    ProxyKind::Rectangle => plain,
-                    ProxyKind::Box => Self::box_proxy(view, object, aabb).unwrap_or(plain),
-                });
+                let boxed = || Self::box_proxy(view, object, aabb);
+                out.extend(self.stand_in(view, &clip, (rectangle, depth), boxed));
                 true
             }
         }
+    }
+
+    /// What to ask about in place of a box that is within `rectangle` and nowhere nearer than `depth`;
+    /// the rectangle where no other can be formed. `None` where no sample can be within.
+    fn stand_in(
+        &self,
+        view: &View<'_>,
+        clip: &ClipBox,
+        (rectangle, depth): (PixelRectangle, f32),
+        boxed: impl FnOnce() -> Option<Proxy>,
+    ) -> Option<Proxy> {
+        let PixelRectangle { min, max } = rectangle;
+        let plain = Proxy::Rectangle { min, max, depth };
+        Some(match self.proxy {
+            ProxyKind::Rectangle => plain,
+            ProxyKind::Hull => {
+                let pixels = (view.viewport.width, view.viewport.height);
+                match clip.outline(pixels, (rectangle, depth)) {
+                    Outline::Nowhere => return None,
+                    Outline::Rectangle => plain,
+                    Outline::Within { hull, depth } => Proxy::Hull { hull, min, max, depth },
+                }
+            }
+            ProxyKind::Box => boxed().unwrap_or(plain),
+        })
     }
 
     /// The inflated box of an object's node; scene nodes keep the rectangle.

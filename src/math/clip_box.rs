@@ -12,10 +12,15 @@
 //! the dilated bounds, bounds included, and no other sample can be covered.
 //! Depth at a sample is a convex combination of vertex depths and monotonically rounded, so it is
 //! never below the smallest vertex depth.
+//! Drawn, the rectangle is two triangles of one depth whose corners are corners of pixels. These snap to
+//! where they are, half a pixel from every sample, so that it covers its samples and no others. A device
+//! that interpolates depth by differences finds that depth exactly; one that adds three products of it
+//! in f32 may be off by what [`FLAT_DEPTH_STEP`](super::FLAT_DEPTH_STEP) says, of which the half of
+//! [`DEPTH_ROUNDING`] that the contents do not need covers three units of eight.
 
 use glam::{DMat4, DVec4};
 
-use super::{Aabb, ClipError};
+use super::{Aabb, ClipError, Margins};
 use crate::math::clip_error::absolute;
 
 /// Dilation of a projected box beyond its transform bound, for window arithmetic (2⁻⁷ pixel) and for
@@ -79,6 +84,16 @@ pub enum FrustumPlane {
     Far,
 }
 
+/// The corners of a box in the window, rows going down, and how far f32 transforms may move its contents.
+pub(super) struct WindowCorners {
+    /// Column and row of each, pixels.
+    pub(super) corners: [[f64; 2]; 8],
+    /// The transform bound on each axis, pixels.
+    pub(super) bound: [f64; 2],
+    /// Smallest w of anything inside.
+    w_min: f64,
+}
+
 /// The corners of a box in clip space with the bound on its contents' error.
 #[derive(Clone, Copy, Debug)]
 pub struct ClipBox {
@@ -131,45 +146,65 @@ impl ClipBox {
     /// The rectangle and nearest depth of the contents in a viewport of `width` × `height` pixels.
     #[must_use]
     pub fn project(&self, width: u32, height: u32) -> Projection {
+        self.project_with(width, height, &Margins::PROVEN)
+    }
+
+    /// The same with other margins than the proven ones.
+    #[must_use]
+    pub fn project_with(&self, width: u32, height: u32, margins: &Margins) -> Projection {
         if self.outside_frustum() {
             return Projection::Nowhere;
         }
+        let Some(window) = self.window(width, height) else { return Projection::Unbounded };
+        let axis = |axis: usize, pixels: u32| {
+            let (low, high) = window
+                .corners
+                .iter()
+                .map(|corner| corner[axis])
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), at| (l.min(at), h.max(at)));
+            let margin = window.bound[axis] + margins.rectangle_pixels;
+            // The first and one beyond the last pixel whose middle is within.
+            let clamp = |pixel: f64| pixel.clamp(0.0, f64::from(pixels)) as u32;
+            (clamp((low - margin - 0.5).ceil()), clamp((high + margin + 0.5).floor()))
+        };
+        let ((x0, x1), (y0, y1)) = (axis(0, width), axis(1, height));
+        if x0 >= x1 || y0 >= y1 {
+            return Projection::Nowhere;
+        }
+        let [_, _, ez, ew] = self.error;
+        let nearest = self.corners.iter().fold(1.0_f64, |z, c| z.min(c.z / c.w));
+        let depth = floor_f32(nearest - (ez + ew) / window.w_min - margins.depth);
+        let rectangle = PixelRectangle { min: [x0, y0], max: [x1, y1] };
+        Projection::Within { rectangle, depth: depth.clamp(0.0, 1.0) }
+    }
+
+    /// The corners in the window; `None` where the box reaches the near plane or the smallest w, or is not
+    /// finite.
+    pub(super) fn window(&self, width: u32, height: u32) -> Option<WindowCorners> {
         let [ex, ey, ez, ew] = self.error;
         let w_min = self.corners.iter().fold(f64::INFINITY, |w, c| w.min(c.w)) - ew;
         let z_min = self.corners.iter().fold(f64::INFINITY, |z, c| z.min(c.z)) - ez;
         // Written so that NaN falls out here: "cannot project" means visible.
         if !(w_min > 0.0 && z_min > 0.0 && self.corners.iter().all(|c| c.is_finite())) {
-            return Projection::Unbounded;
+            return None;
         }
-        let axis = |component: usize, e: f64, pixels: u32, sign: f64| {
-            let half = f64::from(pixels) * 0.5;
-            let (mut low, mut high, mut reach) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
-            for corner in &self.corners {
-                let ratio = corner[component] / corner.w;
+        let mut window = WindowCorners { corners: [[0.0; 2]; 8], bound: [0.0; 2], w_min };
+        for (axis, (e, pixels, sign)) in [(ex, width, 1.0), (ey, height, -1.0)].iter().enumerate() {
+            let half = f64::from(*pixels) * 0.5;
+            let mut reach = 0.0_f64;
+            for (place, corner) in window.corners.iter_mut().zip(&self.corners) {
+                let ratio = corner[axis] / corner.w;
                 reach = reach.max(ratio.abs());
-                let window = ratio * sign * half + half;
-                low = low.min(window);
-                high = high.max(window);
+                place[axis] = ratio * sign * half + half;
             }
-            let margin = (e + reach * ew) / w_min * half + RECTANGLE_DILATION_PIXELS;
-            // The first and one beyond the last pixel whose middle is within.
-            let clamp = |pixel: f64| pixel.clamp(0.0, f64::from(pixels)) as u32;
-            (clamp((low - margin - 0.5).ceil()), clamp((high + margin + 0.5).floor()))
-        };
-        let (x0, x1) = axis(0, ex, width, 1.0);
-        let (y0, y1) = axis(1, ey, height, -1.0);
-        if x0 >= x1 || y0 >= y1 {
-            return Projection::Nowhere;
+            window.bound[axis] = (e + reach * ew) / w_min * half;
         }
-        let nearest = self.corners.iter().fold(1.0_f64, |z, c| z.min(c.z / c.w));
-        let depth = floor_f32(nearest - (ez + ew) / w_min - DEPTH_ROUNDING);
-        let rectangle = PixelRectangle { min: [x0, y0], max: [x1, y1] };
-        Projection::Within { rectangle, depth: depth.clamp(0.0, 1.0) }
+        Some(window)
     }
 }
 
 /// The largest f32 that is not above `value`.
-fn floor_f32(value: f64) -> f32 {
+pub(super) fn floor_f32(value: f64) -> f32 {
     let rounded = value as f32;
     if f64::from(rounded) > value { rounded.next_down() } else { rounded }
 }

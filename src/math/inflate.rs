@@ -8,11 +8,19 @@
 //! in the last, so the point moved by d = (a − b·v) / (1 + b). A box grown by |d| on each axis holds
 //! every such point, and being convex in front of the eye it covers every sample of the contents at a
 //! depth no greater than theirs.
+//!
+//! What is drawn of the grown box has moved corners too. Its faces towards the eye are one sheet whose
+//! outline, like a hull's (`hull`), goes round the sample's place at a distance that those moves do not
+//! reach, so one of their triangles covers it; faces that a move turns to the other side are edge-on and
+//! add nothing, for both faces count. The weak place of the proof is depth: a device may evaluate the
+//! plane of a triangle anywhere within the pixel, and how far that is off has no bound for a face that is
+//! nearly edge-on ([`BOX_DEPTH_SLACK`]). The attack in `tests/it/proxies.rs` found no such case on the
+//! reference, which interpolates exactly.
 
 use glam::{DMat4, DVec3, DVec4};
 
 use super::clip_error::absolute;
-use super::{Aabb, ClipError};
+use super::{Aabb, ClipError, Margins};
 
 /// Depth by which the faces of a box proxy stand before its contents: 64 ulps of a depth near 1, for
 /// a device that evaluates a plane in f32 (three roundings of terms that stay below the viewport's
@@ -22,7 +30,7 @@ pub const BOX_DEPTH_SLACK: f64 = 64.0 * (f32::EPSILON as f64 / 2.0);
 /// Pixels by which a box grows on each side: what moves its contents' corners in the window (see
 /// `RECTANGLE_DILATION_PIXELS`, under 2⁻⁴) moves its own as well, and a device evaluates the slope of
 /// its faces at places of its own within the pixel; one pixel holds all three.
-const BOX_DILATION_PIXELS: f64 = 1.0;
+pub const BOX_DILATION_PIXELS: f64 = 1.0;
 /// Rounding of the inverse and of the products with it; a matrix so ill-conditioned that this does
 /// not hold gives a box that reaches the near plane, hence a rectangle.
 const INVERSE_SLACK: f64 = 2.0;
@@ -36,16 +44,28 @@ pub fn inflated_box(
     aabb: &Aabb,
     clip_from_box: &DMat4,
     error: &ClipError,
+    viewport: (u32, u32),
+) -> Option<Aabb> {
+    inflated_box_with(aabb, clip_from_box, error, viewport, &Margins::PROVEN)
+}
+
+/// The same with other margins than the proven ones.
+#[must_use]
+pub fn inflated_box_with(
+    aabb: &Aabb,
+    clip_from_box: &DMat4,
+    error: &ClipError,
     (width, height): (u32, u32),
+    margins: &Margins,
 ) -> Option<Aabb> {
     let corners = aabb.corners().map(|corner| *clip_from_box * corner.extend(1.0));
     let w_max = corners.iter().fold(0.0_f64, |w, c| w.max(c.w));
-    let pixel = |pixels: u32| 2.0 * BOX_DILATION_PIXELS / f64::from(pixels) * w_max;
+    let pixel = |pixels: u32| 2.0 * margins.box_pixels / f64::from(pixels) * w_max;
     let own = error.bound.map(|bound| 2.0 * bound);
     let moved = DVec4::new(
         own[0] + own[3] + pixel(width),
         own[1] + own[3] + pixel(height),
-        own[2] + own[3] + BOX_DEPTH_SLACK * w_max,
+        own[2] + own[3] + margins.box_depth * w_max,
         own[3],
     );
     let shift = absolute(&clip_from_box.inverse()) * moved * INVERSE_SLACK;

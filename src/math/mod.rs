@@ -4,7 +4,9 @@
 mod aabb;
 mod clip_box;
 mod clip_error;
+mod hull;
 mod inflate;
+mod margins;
 mod trig;
 
 pub use aabb::{Aabb, TRANSFORM_MARGIN};
@@ -12,5 +14,9 @@ pub use clip_box::{
     ClipBox, DEPTH_ROUNDING, FrustumPlane, PixelRectangle, Projection, RECTANGLE_DILATION_PIXELS,
 };
 pub use clip_error::{CLIP_ERROR_GAMMA, ClipError, rounded_clip_matrix};
-pub use inflate::{BOX_DEPTH_SLACK, inflated_box};
+pub use hull::{
+    FLAT_DEPTH_STEP, HULL_DILATION_PIXELS, HULL_SUBPIXELS, Hull, MOST_HULL_CORNERS, Outline,
+};
+pub use inflate::{BOX_DEPTH_SLACK, BOX_DILATION_PIXELS, inflated_box, inflated_box_with};
+pub use margins::Margins;
 pub use trig::{cos, sin, tan};

@@ -11,7 +11,8 @@
 //!    the rectangle's corners, so four looks are enough.
 //!
 //! Its depth is the reference's, so what it may add to `sim` is only "visible". It loses where rectangles
-//! are large or straddle texels. A box is no rectangle: it counts as visible unasked.
+//! are large or straddle texels. A hull is asked about by the rectangle around it; a box counts as visible
+//! unasked.
 
 use std::marker::PhantomData;
 
@@ -195,7 +196,9 @@ impl<R: PyramidRules> Oracle for HierarchicalZ<R> {
             self.build();
         }
         let visible = proxies.iter().any(|proxy| match *proxy {
-            Proxy::Rectangle { min, max, depth } => self.pyramid.may_show(min, max, depth),
+            Proxy::Rectangle { min, max, depth } | Proxy::Hull { min, max, depth, .. } => {
+                self.pyramid.may_show(min, max, depth)
+            }
             Proxy::Box { .. } => true,
         });
         self.answers.answer(visible)

@@ -26,6 +26,7 @@ use std::sync::Arc;
 use plainsight_reference::Tolerance;
 use plainsight_reference::fast::Options;
 
+use crate::math::{HULL_SUBPIXELS, Hull};
 use crate::part::{PartId, Partition};
 use crate::scene::Viewport;
 
@@ -34,7 +35,7 @@ pub use cost::{Amounts, CostModel};
 pub use fit::{FitError, Measurement};
 pub use hierarchical_z::HierarchicalZ;
 #[cfg(feature = "hardware")]
-use proxy_mesh::box_proxy_triangles;
+use proxy_mesh::{box_proxy_triangles, hull_proxy_triangles, rectangle_triangles};
 pub use residency::{Memory, MemoryKnobs, Residency, Step, least_budget, mesh_bytes};
 pub use sim::{Sim, part_draw, part_instance};
 
@@ -60,6 +61,18 @@ pub enum Proxy {
         /// Depth of every sample.
         depth: f32,
     },
+    /// A convex polygon at one depth in [0, 1]. An oracle that answers rectangles alone takes the one
+    /// around it, at the same depth: that errs towards "visible" only.
+    Hull {
+        /// The polygon, within the rectangle.
+        hull: Hull,
+        /// First column and row of the rectangle.
+        min: [u32; 2],
+        /// One beyond its last column and row.
+        max: [u32; 2],
+        /// Depth of every sample.
+        depth: f32,
+    },
     /// The twelve triangles of a box with interpolated depth.
     Box {
         /// Clip from the box's space, column-major.
@@ -71,14 +84,19 @@ pub enum Proxy {
     },
 }
 
+/// Square sub-pixels of a hull's grid in a pixel.
+const SQUARE_SUBPIXELS: u64 = (HULL_SUBPIXELS as u64) * (HULL_SUBPIXELS as u64);
+
 impl Proxy {
-    /// Samples that it covers; 0 for a box, whose fill is not known before it is projected.
+    /// Samples that it covers; of a hull its area in pixels, rounded up, which is as many but for those
+    /// along its outline; 0 for a box, whose fill is not known before it is projected.
     #[must_use]
     pub fn pixels(&self) -> u64 {
         match self {
             Self::Rectangle { min, max, .. } => {
                 u64::from(max[0] - min[0]) * u64::from(max[1] - min[1])
             }
+            Self::Hull { hull, .. } => hull.twice_area().div_ceil(2 * SQUARE_SUBPIXELS),
             Self::Box { .. } => 0,
         }
     }
@@ -133,8 +151,8 @@ pub enum Questions {
     /// An occlusion query object each.
     #[default]
     Queries,
-    /// Rectangles by maxima of the depth target on the device. A box is not a rectangle: it counts as
-    /// visible unasked.
+    /// Rectangles by maxima of the depth target on the device. A hull is asked about by the rectangle
+    /// around it. A box has none: it counts as visible unasked.
     Pyramid,
     /// The same by maxima on this side, of depth that is read back.
     ReadBack,

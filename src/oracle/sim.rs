@@ -5,7 +5,7 @@ use plainsight_reference::fast::Instance;
 use plainsight_reference::{Draw, Faces, Image, fast};
 
 use super::batches::Batches;
-use super::proxy_mesh::box_triangles;
+use super::proxy_mesh::{box_triangles, hull_corners, hull_fan};
 use super::{
     Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Residency, Stage,
 };
@@ -94,6 +94,37 @@ impl Sim {
     }
 }
 
+/// As many as a box has triangles, and a hull at most.
+const RANKS: [u32; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+/// Of what comes in clip space with w = 1.
+const IDENTITY: [f32; 16] =
+    [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+
+impl Proxy {
+    /// Whether any of its samples passes against `image`: the reference's answer to a question about it.
+    /// Of a rectangle or hull the image must have the viewport that it was made for.
+    #[must_use]
+    pub fn shows(&self, image: &Image) -> bool {
+        let any = |positions: &[[f32; 3]], triangles: &[[u32; 3]], clip_from_object| {
+            let ranks = &RANKS[..triangles.len()];
+            let (first_draw, faces) = (0, Faces::Both);
+            let draw = Draw { positions, triangles, ranks, first_draw, clip_from_object, faces };
+            fast::any(image, &draw)
+        };
+        match *self {
+            Self::Rectangle { min, max, depth } => image.any_rectangle(min, max, depth),
+            Self::Hull { hull, depth, .. } => {
+                let corners = hull_corners(image.viewport(), &hull, depth);
+                any(&corners, &hull_fan()[..hull.corners().len().saturating_sub(2)], IDENTITY)
+            }
+            Self::Box { clip_from_box, min, max } => {
+                let (positions, triangles) = box_triangles(min, max);
+                any(&positions, &triangles, clip_from_box)
+            }
+        }
+    }
+}
+
 impl Oracle for Sim {
     fn name(&self) -> &'static str {
         "sim"
@@ -125,23 +156,7 @@ impl Oracle for Sim {
 
     fn ask(&mut self, proxies: &[Proxy]) -> QueryId {
         self.flush();
-        let any = |proxy: &Proxy| match *proxy {
-            Proxy::Rectangle { min, max, depth } => self.image.any_rectangle(min, max, depth),
-            Proxy::Box { clip_from_box, min, max } => {
-                let (positions, triangles) = box_triangles(min, max);
-                let ranks: [u32; 12] = std::array::from_fn(|i| i as u32);
-                let draw = Draw {
-                    positions: &positions,
-                    triangles: &triangles,
-                    ranks: &ranks,
-                    first_draw: 0,
-                    clip_from_object: clip_from_box,
-                    faces: Faces::Both,
-                };
-                fast::any(&self.image, &draw)
-            }
-        };
-        let visible = proxies.iter().any(any);
+        let visible = proxies.iter().any(|proxy| proxy.shows(&self.image));
         self.answers.answer(visible)
     }
 

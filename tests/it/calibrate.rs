@@ -57,11 +57,12 @@ fn bad_arguments_are_one_line_and_leave_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("cal.toml");
     let out = out.to_str().unwrap();
-    let cases: [(&[&str], i32, &str); 8] = [
+    let cases: [(&[&str], i32, &str); 9] = [
         (&["--oracle", "delphi"], 2, "no oracle is called 'delphi'"),
         (&["--oracle", "always"], 2, "--oracle always takes no time"),
         (&["--oracle", "sim", "--memory", "64"], 2, "no price for loading"),
         (&["--oracle", "sim", "--proxy", "box"], 2, "rectangles are measured"),
+        (&["--oracle", "sim", "--proxy", "hull"], 2, "rectangles are measured"),
         (&["--oracle", "sim", "--cost", "other.toml"], 2, "none is read"),
         (&["--oracle", "sim", "--mesh", "missing.obj"], 2, "missing.obj"),
         (&["--oracle", "sim", "--index", "heap"], 2, "no index is called 'heap'"),

@@ -35,7 +35,9 @@ fn cullers_hold_on_a_second_device() {
         .collect();
     let mut failures = Vec::new();
     for world in worlds(FEW_FRAMES) {
-        for (trace, gate) in gates(&world, &few, INDEXES[0], "swiftshader", ProxyKind::Rectangle) {
+        let by_rectangles = gates(&world, &few, INDEXES[0], "swiftshader", ProxyKind::Rectangle);
+        let by_hulls = gates(&world, &few[..1], INDEXES[0], "swiftshader", ProxyKind::Hull);
+        for (trace, gate) in by_rectangles.into_iter().chain(by_hulls) {
             if !gate.held() {
                 let (scene, culler) = (&world.scene.name, &trace.lane.culler);
                 failures.push(format!("{scene} {culler}: {}", gate.failures().join("; ")));
@@ -92,4 +94,5 @@ fn every_culler_holds_on_the_real_device() {
     let (few, many) = by_trips();
     hold(&few, ("hardware", FEW_FRAMES), INDEXES[0], ProxyKind::Rectangle);
     hold(&many, ("hardware", 1), INDEXES[0], ProxyKind::Rectangle);
+    hold(&CULLERS[..1], ("hardware", FEW_FRAMES), INDEXES[0], ProxyKind::Hull);
 }

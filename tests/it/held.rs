@@ -32,7 +32,7 @@ fn on_device(oracle: &str) -> bool {
 }
 
 /// Every index, oracle and proxy, each with what it bears upon: real devices over the first index
-/// alone, boxes only where they are asked about.
+/// alone, boxes only where they are asked about, hulls on the simulated one.
 fn pairings() -> Vec<(IndexKind, &'static str, ProxyKind)> {
     let mut pairings = Vec::new();
     for (place, &index) in INDEXES.iter().enumerate() {
@@ -40,6 +40,9 @@ fn pairings() -> Vec<(IndexKind, &'static str, ProxyKind)> {
             pairings.push((index, oracle, ProxyKind::Rectangle));
             if ["sim", "hardware"].contains(&oracle) {
                 pairings.push((index, oracle, ProxyKind::Box));
+            }
+            if (place, oracle) == (0, "sim") {
+                pairings.push((index, oracle, ProxyKind::Hull));
             }
         }
     }
@@ -75,16 +78,20 @@ fn cullers_spend_in_the_papers_order() {
 fn random_soups_hold() {
     let mut runner =
         TestRunner::new(Config { cases: 24, failure_persistence: None, ..Config::default() });
-    let knobs = (any::<u32>(), 0.002_f64..0.03, 0..CULLERS.len(), 0..INDEXES.len(), any::<bool>());
+    let knobs = (any::<u32>(), 0.002_f64..0.03, 0..CULLERS.len(), 0..INDEXES.len(), 0..3_usize);
     runner
-        .run(&knobs, |(seed, scale, culler, index, boxed)| {
+        .run(&knobs, |(seed, scale, culler, index, proxy)| {
             let world = world("soup", u64::from(seed), scale, 3);
-            let proxy = if boxed { ProxyKind::Box } else { ProxyKind::Rectangle };
+            let (proxy, flag) = [
+                (ProxyKind::Rectangle, "rectangle"),
+                (ProxyKind::Hull, "hull"),
+                (ProxyKind::Box, "box"),
+            ][proxy];
             let (culler, index) = (CULLERS[culler], INDEXES[index]);
             let (_, gate) = gate(&world, culler, index, "sim", proxy);
             let replay = format!(
                 "plainsight replay --scene soup --seed {seed} --scale {scale} --frames 3 --viewport 321x243 --leaf 256 --culler {} --index {} --proxy {}",
-                culler.name, index.name, if boxed { "box" } else { "rectangle" }
+                culler.name, index.name, flag
             );
             prop_assert!(gate.held(), "{:?}\nreplay: {replay}", gate.failures());
             Ok(())

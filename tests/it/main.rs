@@ -19,6 +19,7 @@ mod margins;
 mod memory;
 mod oracle;
 mod partition;
+mod proxies;
 mod readers;
 mod snapshots;
 mod tidy;

@@ -3,7 +3,8 @@
 
 use glam::{DMat4, DVec3, DVec4};
 use plainsight::math::{
-    Aabb, CLIP_ERROR_GAMMA, ClipBox, ClipError, DEPTH_ROUNDING, Projection,
+    Aabb, CLIP_ERROR_GAMMA, ClipBox, ClipError, DEPTH_ROUNDING, FLAT_DEPTH_STEP,
+    HULL_DILATION_PIXELS, Hull, MOST_HULL_CORNERS, Margins, Outline, Projection,
     RECTANGLE_DILATION_PIXELS, inflated_box, rounded_clip_matrix,
 };
 use plainsight::scene::{Camera, Lens, Stream, Viewport};
@@ -243,4 +244,136 @@ fn a_matrix_without_inverse_gives_no_box() {
     let flat = DMat4::from_cols(DVec4::X, DVec4::Y, DVec4::ZERO, DVec4::new(0.0, 0.0, 0.5, 1.0));
     let aabb = Aabb::new(DVec3::ZERO, DVec3::ONE);
     assert_eq!(inflated_box(&aabb, &flat, &ClipError::ZERO, (10, 10)), None);
+}
+
+/// The outline of a box in a viewport, with the rectangle and its depth; `None` where there is none.
+fn outline(clip: &ClipBox, side: u32, margins: &Margins) -> Option<(Outline, f32)> {
+    match clip.project(side, side) {
+        Projection::Within { rectangle, depth } => {
+            Some((clip.outline_with((side, side), (rectangle, depth), margins), depth))
+        }
+        _ => None,
+    }
+}
+
+/// Whether a place, in sub-pixels, is within a hull or on its edge.
+fn holds(hull: &Hull, [x, y]: [i64; 2]) -> bool {
+    let corners = hull.corners();
+    let next = corners.iter().cycle().skip(1);
+    corners.iter().zip(next).all(|(a, b)| {
+        let [ax, ay, bx, by] = [a[0], a[1], b[0], b[1]].map(i64::from);
+        (bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0
+    })
+}
+
+/// A square that stands on its corner, 20 pixels from the middle (50, 50) of 100 × 100 pixels to each.
+fn diamond() -> ClipBox {
+    let half = 0.4 / 2.0_f64.sqrt();
+    let aabb = Aabb::new(DVec3::new(-half, -half, 0.5), DVec3::new(half, half, 0.6));
+    let turned = DMat4::from_rotation_z(std::f64::consts::FRAC_PI_4);
+    ClipBox::new(&aabb, &turned, &ClipError::ZERO)
+}
+
+/// Beside a slanted side the hull holds what is as far from the box as its dilation, and not what is a
+/// little farther than the grid's rounding.
+#[test]
+fn a_hull_is_dilated_by_its_margin() {
+    let pixels = |margin: f64| Margins { hull_pixels: margin, ..Margins::PROVEN };
+    let at = |margin: f64, beyond: i64| {
+        let Some((Outline::Within { hull, .. }, _)) = outline(&diamond(), 100, &pixels(margin))
+        else {
+            panic!("a hull")
+        };
+        // The middle of a slanted side is (60, 60); as far on both axes is as far in the max norm.
+        holds(&hull, [60 * 256 + beyond; 2])
+    };
+    let dilation = (HULL_DILATION_PIXELS * 256.0) as i64;
+    assert!(at(HULL_DILATION_PIXELS, dilation), "at the bound");
+    assert!(at(HULL_DILATION_PIXELS, dilation - 1), "under it");
+    assert!(!at(HULL_DILATION_PIXELS, dilation + 3), "over it");
+    assert!(!at(HULL_DILATION_PIXELS - 4.0 / 256.0, dilation), "with a margin under it");
+    assert!(at(HULL_DILATION_PIXELS + 4.0 / 256.0, dilation + 3), "with one over it");
+}
+
+#[test]
+fn the_depth_of_a_hull_stands_before_the_rectangles() {
+    let Some((Outline::Within { depth, .. }, plain)) = outline(&diamond(), 100, &Margins::PROVEN)
+    else {
+        panic!("a hull")
+    };
+    let step = f64::from(plain) - f64::from(depth);
+    assert!(step >= FLAT_DEPTH_STEP && step < FLAT_DEPTH_STEP + f64::from(f32::EPSILON), "{step}");
+}
+
+/// A box that stands upright fills its rectangle; one whose corner is beyond the grid has no hull.
+#[test]
+fn the_rectangle_stands_in_for_a_hull() {
+    let upright = plain([-0.37, -0.37, 0.5], [0.41, 0.41, 0.6]);
+    assert_eq!(outline(&upright, 100, &Margins::PROVEN).unwrap().0, Outline::Rectangle);
+    let reach = |pixels: f64| {
+        let slanted = DMat4::from_cols(
+            DVec4::new(pixels / 50.0, pixels / 50.0, 0.0, 0.0),
+            DVec4::new(0.0, 0.01, 0.0, 0.0),
+            DVec4::new(0.0, 0.0, 1.0, 0.0),
+            DVec4::new(0.0, 0.0, 0.0, 1.0),
+        );
+        let aabb = Aabb::new(DVec3::new(-1.0, -1.0, 0.5), DVec3::new(1.0, 1.0, 0.6));
+        outline(&ClipBox::new(&aabb, &slanted, &ClipError::ZERO), 100, &Margins::PROVEN)
+    };
+    let grid = f64::from(1 << 20);
+    assert!(matches!(reach(grid - 60.0), Some((Outline::Within { .. }, _))), "under it");
+    assert!(matches!(reach(grid), Some((Outline::Rectangle, _))), "over it");
+}
+
+/// A box whose rectangle reaches the screen although its outline passes beside the corner.
+#[test]
+fn an_outline_beside_the_screen_is_nowhere() {
+    let beside = |across: f64| {
+        let slanted = DMat4::from_cols(
+            DVec4::new(0.5, -0.5, 0.0, 0.0),
+            DVec4::new(0.01, 0.01, 0.0, 0.0),
+            DVec4::new(0.0, 0.0, 1.0, 0.0),
+            DVec4::new(across, across, 0.0, 1.0),
+        );
+        let aabb = Aabb::new(DVec3::new(-1.0, -1.0, 0.5), DVec3::new(1.0, 1.0, 0.6));
+        outline(&ClipBox::new(&aabb, &slanted, &ClipError::ZERO), 100, &Margins::PROVEN)
+    };
+    assert!(matches!(beside(1.2), Some((Outline::Nowhere, _))));
+    assert!(matches!(beside(0.9), Some((Outline::Within { .. }, _))));
+}
+
+/// However a box is seen, its hull is convex up to the rounding of cut corners, lies within the
+/// rectangle, and has no more corners than were derived.
+#[test]
+fn hulls_stay_within_their_rectangles() {
+    let mut stream = Stream::new(6, "hulls");
+    let (mut hulls, mut most) = (0, 0);
+    for round in 0..20_000 {
+        let entry =
+            |stream: &mut Stream| stream.range(-1.0, 1.0) * libm_pow10(stream.range(-3.0, 1.0));
+        let mut matrix = DMat4::from_cols_array(&[0.0; 16].map(|_| entry(&mut stream)));
+        (matrix.x_axis.z, matrix.y_axis.z, matrix.z_axis.z) = (0.0, 0.0, 0.1);
+        (matrix.w_axis.z, matrix.w_axis.w) = (0.5, stream.range(1.0, 40.0));
+        let aabb = Aabb::new(DVec3::splat(-1.0), DVec3::ONE);
+        let clip = ClipBox::new(&aabb, &matrix, &ClipError::ZERO);
+        let (width, height) = (1 + stream.below(300), 1 + stream.below(300));
+        let Projection::Within { rectangle, depth } = clip.project(width, height) else { continue };
+        let Outline::Within { hull, depth: nearer } =
+            clip.outline((width, height), (rectangle, depth))
+        else {
+            continue;
+        };
+        hulls += 1;
+        most = most.max(hull.corners().len());
+        assert!(nearer <= depth && nearer >= 0.0, "round {round}");
+        let side = |axis: usize, at: i32| {
+            (rectangle.min[axis] as i32 * 256..=rectangle.max[axis] as i32 * 256).contains(&at)
+        };
+        let inside = hull.corners().iter().all(|c| side(0, c[0]) && side(1, c[1]));
+        assert!(inside, "round {round}: {hull:?} in {rectangle:?}");
+        let all: u64 = (0..2).map(|i| u64::from(rectangle.max[i] - rectangle.min[i])).product();
+        assert!(hull.twice_area() < all * 2 * 65536, "round {round}");
+    }
+    assert!(hulls > 3_000, "{hulls} hulls prove little");
+    assert!((9..=MOST_HULL_CORNERS).contains(&most), "{most} corners");
 }

@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+use glam::{DMat4, DVec3};
+use plainsight::math::{Aabb, ClipBox, ClipError, Outline, Projection};
 use plainsight::oracle::wgpu::{GpuStage, Hardware, QUERIES_PER_PASS};
 use plainsight::oracle::{Answer, FrameView, Oracle, Proxy, Questions, Sim, Stage};
 use plainsight::part::{PartId, Partition, PartitionKnobs};
@@ -178,4 +180,61 @@ fn maxima_answer_as_queries_do() {
         let same = answers[0].iter().zip(others).filter(|(a, b)| a == b).count();
         assert_eq!((same, others.len()), (600, 600), "answers agree with the reference");
     }
+}
+
+/// A hull of a random box that is on a screen, at a depth of its own.
+fn hull(stream: &mut Stream, Viewport { width, height }: Viewport, depth: f32) -> Option<Proxy> {
+    let mut place = || stream.range(-0.9, 0.9);
+    let at = DVec3::new(place(), place(), 0.5);
+    let turn = DMat4::from_rotation_z(place() * 3.0) * DMat4::from_rotation_x(place() * 0.2);
+    let size = stream.range(0.01, 0.3);
+    let aabb = Aabb::new(DVec3::splat(-size), DVec3::splat(size));
+    let clip = ClipBox::new(&aabb, &(DMat4::from_translation(at) * turn), &ClipError::ZERO);
+    let Projection::Within { rectangle, depth: nearest } = clip.project(width, height) else {
+        return None;
+    };
+    match clip.outline((width, height), (rectangle, nearest)) {
+        Outline::Within { hull, .. } => {
+            Some(Proxy::Hull { hull, min: rectangle.min, max: rectangle.max, depth })
+        }
+        _ => None,
+    }
+}
+
+/// Random hulls over a random picture: query objects cover the same samples at the same depth as the
+/// reference, and what knows rectangles alone errs towards "visible".
+#[test]
+fn hulls_are_answered_as_the_reference_does() {
+    let world = crate::common::world("rooms", 3, 0.02, 1);
+    let state = plainsight::run::FrameState::first(&world);
+    let mut answers = Vec::new();
+    for name in ["sim", "hardware", "hierarchical-z", "pyramid", "read-back"] {
+        let mut oracle = crate::common::oracle(name, &world);
+        let view = FrameView { frame: 0, clip_from_object: &state.matrices };
+        oracle.begin_frame(&view).unwrap();
+        (0..world.partition.part_count()).for_each(|part| oracle.draw_part(PartId(part)));
+        let depths = oracle.read_back().unwrap().unwrap().depth;
+        let mut stream = Stream::new(9, "hulls");
+        let mut asked = 0;
+        while asked < 600 {
+            // A depth that is stored somewhere, or one beside it.
+            let stored = depths[stream.below(depths.len() as u32) as usize];
+            let depth = [stored, stored.next_up(), stored.next_down()][stream.below(3) as usize];
+            if let Some(proxy) = hull(&mut stream, world.scene.viewport, depth.clamp(0.0, 1.0)) {
+                oracle.ask(&[proxy]);
+                asked += 1;
+            }
+        }
+        answers.push(collect(oracle.as_mut()));
+    }
+    let shown = answers[0].iter().filter(|a| a.visible).count();
+    assert!((100..500).contains(&shown), "{shown} of 600 show: the test sees both answers");
+    let same = answers[0].iter().zip(&answers[1]).filter(|(a, b)| a == b).count();
+    assert_eq!((same, answers[1].len()), (600, 600), "query objects agree with the reference");
+    for others in &answers[2..] {
+        let hides = answers[0].iter().zip(others).any(|(a, b)| a.visible && !b.visible);
+        assert!(!hides && others.len() == 600, "the rectangle around a hull errs towards visible");
+    }
+    let by_rectangles = answers[3].iter().filter(|a| a.visible).count();
+    assert!(by_rectangles > shown, "a hull is tighter than its rectangle");
 }

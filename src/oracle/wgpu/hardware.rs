@@ -13,10 +13,9 @@ use super::slot::{Need, QUERIES_PER_PASS, RESULT_BYTES, Slot};
 use super::stage::{DrawnObject, GpuParts, GpuStage};
 use crate::oracle::{
     Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, Questions, ReadBack, Residency,
-    Step, box_proxy_triangles,
+    Step, box_proxy_triangles, hull_proxy_triangles, rectangle_triangles,
 };
 use crate::part::{ObjectId, PartId};
-use crate::scene::Viewport;
 
 /// One thing to do, in the order it was said.
 #[derive(Clone, Copy)]
@@ -352,7 +351,7 @@ impl Hardware {
         let (first, question) = (self.asks.len() as u32, self.open.len() as u32);
         for proxy in proxies {
             match *proxy {
-                Proxy::Rectangle { min, max, depth } => {
+                Proxy::Rectangle { min, max, depth } | Proxy::Hull { min, max, depth, .. } => {
                     self.asks.push(Ask { low: min, high: max, depth, question });
                 }
                 Proxy::Box { .. } => self.unasked.push(question),
@@ -471,19 +470,6 @@ impl Hardware {
     }
 }
 
-/// Two triangles over whole pixels at one depth, w = 1.
-///
-/// The window position of a pixel edge comes back as ndc·(W/2) + W/2 in f32: for sides up to 16384
-/// the rounding of ndc (2⁻²⁵ · W/2) and of the sum (2⁻²⁴ · W) stay under 2⁻⁹ pixel, half a sub-pixel, so
-/// snapping restores the edge and exactly these pixels are covered.
-fn rectangle(viewport: Viewport, min: [u32; 2], max: [u32; 2], depth: f32) -> [[f32; 4]; 6] {
-    let across = |x: u32| (f64::from(x) * 2.0 / f64::from(viewport.width) - 1.0) as f32;
-    let down = |y: u32| (1.0 - f64::from(y) * 2.0 / f64::from(viewport.height)) as f32;
-    let (x0, y0, x1, y1) = (across(min[0]), down(min[1]), across(max[0]), down(max[1]));
-    let [a, b, c, d] = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]].map(|[x, y]| [x, y, depth, 1.0]);
-    [a, b, c, a, c, d]
-}
-
 impl Oracle for Hardware {
     fn name(&self) -> &'static str {
         self.questions.name()
@@ -546,11 +532,14 @@ impl Oracle for Hardware {
             return self.ask_rectangles(proxies);
         }
         let first_vertex = self.proxy_vertices.len() as u32;
+        let viewport = self.stage.stage.viewport;
         for proxy in proxies {
             match *proxy {
                 Proxy::Rectangle { min, max, depth } => {
-                    let viewport = self.stage.stage.viewport;
-                    self.proxy_vertices.extend(rectangle(viewport, min, max, depth));
+                    self.proxy_vertices.extend(rectangle_triangles(viewport, min, max, depth));
+                }
+                Proxy::Hull { hull, depth, .. } => {
+                    self.proxy_vertices.extend(hull_proxy_triangles(viewport, &hull, depth));
                 }
                 Proxy::Box { clip_from_box, min, max } => {
                     self.proxy_vertices.extend(box_proxy_triangles(&clip_from_box, min, max));

@@ -1,0 +1,257 @@
+//! The outline of a box on the screen: the convex hull of its projected corners, dilated, on the grid
+//! of sub-pixels. With the box's nearest depth it is the second proxy, tighter than the rectangle
+//! wherever a box does not stand upright before the eye.
+//!
+//! # How it is made
+//! 1. Each corner goes to the nearest place of a grid of 1/256 pixel, as two integers; from here on all
+//!    is exact but for step 4.
+//! 2. It is dilated under the max norm by M, the margin rounded up to the grid with half a step for
+//!    step 1: the corner becomes a square of half-side M, in sub-pixels, on each axis its own.
+//! 3. The convex hull of the squares (Andrew 1979, *Another efficient algorithm for convex hulls in two
+//!    dimensions*) is the Minkowski sum of the corners' hull and one square.
+//! 4. It is cut by the sides of the box's pixel rectangle (Sutherland & Hodgman 1974), so that it never
+//!    covers a sample that the rectangle does not, and never leaves the viewport. New corners go to the
+//!    nearest place of the grid.
+//!
+//! At most 12 corners are left: the corners' hull has at most 8 edges, the square and the rectangle add
+//! edges in the same four directions, and a convex polygon has one edge in each.
+//!
+//! # Why it is conservative
+//! Let p be the middle of a pixel that a triangle of the contents covers, δ the largest that a corner of
+//! such a triangle may be displaced on either axis (transform bound, window arithmetic and snapping: see
+//! `clip_box`), and H the hull of the exact corners. The projection of a convex box before the eye is H,
+//! so p is within δ of H in the max norm. Let Q be the polygon of step 3, m its dilation and Q∩R that of
+//! step 4 before rounding.
+//! - p is at least m − δ inside Q in the max norm: the square of that half-side about p is within H
+//!   dilated by m. p is in the rectangle R, and half a pixel inside its sides, which are edges of pixels.
+//! - Let Q′ be what is drawn: the corners of Q∩R, each displaced by at most d ([`HULL_DILATION_PIXELS`]
+//!   says of what d is made), joined in the same order. Every point of its outline is within d of the
+//!   outline of Q∩R, and so is every outline between the two as the corners slide from there to here.
+//!   With d < m − δ and d < ½ none of them passes through p, so that the outline Q′ goes round p once, as
+//!   that of Q∩R does. Whether Q′ is still convex does not matter.
+//! - The windings of the triangles of a fan add up to that of the outline. So one of them goes round p.
+//!   The top-left rule is the same as taking p an infinitely small step to one side, the same for all
+//!   triangles, so that an inner edge through p belongs to one of the two beside it, and the sum holds
+//!   on edges as well. Both faces count. So p is covered.
+//!
+//! Its depth is the rectangle's, less [`FLAT_DEPTH_STEP`].
+
+use super::clip_box::{ClipBox, PixelRectangle, floor_f32};
+use super::{Margins, RECTANGLE_DILATION_PIXELS};
+
+/// Dilation of a hull beyond its transform bound. [`RECTANGLE_DILATION_PIXELS`] of it are the contents'
+/// side, δ. The other eighth of a pixel is twice d, the hull's own displacement: a corner made by the
+/// rectangle is rounded by 2⁻⁹ pixel, four times at most on one edge (2⁻⁷); clip coordinates and window
+/// arithmetic stay under 2⁻⁹, for viewports of up to 16384 pixels; a device snaps by 2⁻⁵ at most, the
+/// reference not at all, for corners are on its grid. Together they are under 2⁻⁴.
+pub const HULL_DILATION_PIXELS: f64 = RECTANGLE_DILATION_PIXELS + 0.125;
+/// What the depth of a hull stands before the rectangle's: 8 units of 2⁻²⁴.
+///
+/// Its vertices have one depth z and w = 1. Interpolated as a plane, by differences of depths, that is
+/// z exactly, for the differences are zero. The reference adds e₀z + e₁z + e₂z in f64 and divides by the
+/// area: off by 4·2⁻⁵³·z at most, which f32 rounds back to z. A device that adds three products of z
+/// and weights in f32 rounds each weight twice (an area over an area), the product once and the sum
+/// twice: γ₅, and one more for the sum of the weights; 8 units hold them.
+pub const FLAT_DEPTH_STEP: f64 = 8.0 * (f32::EPSILON as f64 / 2.0);
+/// Most corners of a hull, as derived above.
+pub const MOST_HULL_CORNERS: usize = 12;
+/// Places of the grid along a pixel, as many as the reference snaps to.
+pub const HULL_SUBPIXELS: i32 = 256;
+/// Farthest place of a corner from the window's origin, sub-pixels: 2²⁰ pixels. Differences of dilated
+/// corners stay within 2³⁰ and their products within i64, and f64 knows such a place to 2⁻³¹ pixel.
+const FARTHEST: f64 = (1 << 28) as f64;
+
+/// A convex polygon in the window: its corners in order round it, clockwise on the screen, in units of
+/// 1/256 pixel from the top left corner of the viewport, rows going down. It lies within the viewport and
+/// has at least three corners; it may cover no sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hull {
+    corners: [[i32; 2]; MOST_HULL_CORNERS],
+    len: u32,
+}
+
+impl Hull {
+    /// Its corners: column and row in sub-pixels.
+    #[must_use]
+    pub fn corners(&self) -> &[[i32; 2]] {
+        &self.corners[..self.len as usize]
+    }
+
+    /// Twice its area, square sub-pixels, whichever way round it goes.
+    #[must_use]
+    pub fn twice_area(&self) -> u64 {
+        let corners = self.corners();
+        let next = corners.iter().cycle().skip(1);
+        let term = |(a, b): (&[i32; 2], &[i32; 2])| {
+            i64::from(a[0]) * i64::from(b[1]) - i64::from(a[1]) * i64::from(b[0])
+        };
+        corners.iter().zip(next).map(term).sum::<i64>().unsigned_abs()
+    }
+
+    /// Whether a place, in sub-pixels, is within or on an edge.
+    #[must_use]
+    pub fn holds(&self, [x, y]: [i32; 2]) -> bool {
+        let corners = self.corners();
+        let next = corners.iter().cycle().skip(1);
+        let wide = |from: i32, to: i32| i64::from(to) - i64::from(from);
+        corners
+            .iter()
+            .zip(next)
+            .all(|(a, b)| wide(a[0], b[0]) * wide(a[1], y) >= wide(a[1], b[1]) * wide(a[0], x))
+    }
+
+    const EMPTY: Self = Self { corners: [[0; 2]; MOST_HULL_CORNERS], len: 0 };
+
+    /// Appends a corner that is not the last one again; false where there is no room.
+    fn push(&mut self, corner: [i32; 2]) -> bool {
+        if self.corners().last() == Some(&corner) {
+            return true;
+        }
+        let room = (self.len as usize) < MOST_HULL_CORNERS;
+        if room {
+            self.corners[self.len as usize] = corner;
+            self.len += 1;
+        }
+        room
+    }
+
+    /// What of it is on the side of `at` along an axis that `keeps` says; `None` where there is no room.
+    fn cut(&self, axis: usize, at: i32, keeps: impl Fn(i32) -> bool) -> Option<Self> {
+        let mut kept = Self::EMPTY;
+        let Some(&last) = self.corners().last() else { return Some(kept) };
+        let mut from = last;
+        for &to in self.corners() {
+            if keeps(from[axis]) != keeps(to[axis]) && !kept.push(crossing(from, to, axis, at)) {
+                return None;
+            }
+            if keeps(to[axis]) && !kept.push(to) {
+                return None;
+            }
+            from = to;
+        }
+        if kept.len > 1 && kept.corners[0] == kept.corners[kept.len as usize - 1] {
+            kept.len -= 1;
+        }
+        Some(kept)
+    }
+}
+
+/// Where the edge meets the line, to the nearest place of the grid; its ends are not on one side.
+fn crossing(a: [i32; 2], b: [i32; 2], axis: usize, at: i32) -> [i32; 2] {
+    let other = 1 - axis;
+    let along = |from: i32, to: i32| i64::from(to) - i64::from(from);
+    let (mut rise, mut run) = (along(a[other], b[other]), along(a[axis], b[axis]));
+    if run < 0 {
+        (rise, run) = (-rise, -run);
+    }
+    let steps = along(a[axis], at) * rise;
+    let mut place = [at; 2];
+    place[other] = a[other] + (2 * steps + run).div_euclid(2 * run) as i32;
+    place
+}
+
+/// What can be said of a box's outline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outline {
+    /// No sample can be within.
+    Nowhere,
+    /// The rectangle stands in: a corner is too far out for the grid, or the outline holds as many samples.
+    Rectangle,
+    /// Tighter than the rectangle.
+    Within {
+        /// The outline, within the rectangle.
+        hull: Hull,
+        /// Depth of all of it, in [0, 1].
+        depth: f32,
+    },
+}
+
+impl ClipBox {
+    /// The outline of a box that [`ClipBox::project`] finds within `rectangle` and nowhere nearer than
+    /// `depth`.
+    #[must_use]
+    pub fn outline(&self, viewport: (u32, u32), within: (PixelRectangle, f32)) -> Outline {
+        self.outline_with(viewport, within, &Margins::PROVEN)
+    }
+
+    /// The same with other margins than the proven ones.
+    #[must_use]
+    pub fn outline_with(
+        &self,
+        (width, height): (u32, u32),
+        (rectangle, depth): (PixelRectangle, f32),
+        margins: &Margins,
+    ) -> Outline {
+        let Some(window) = self.window(width, height) else { return Outline::Rectangle };
+        let subpixels = f64::from(HULL_SUBPIXELS);
+        let half =
+            window.bound.map(|bound| ((bound + margins.hull_pixels) * subpixels + 0.5).ceil());
+        let mut places = [[0; 2]; 32];
+        for (square, corner) in places.chunks_exact_mut(4).zip(&window.corners) {
+            let middle = corner.map(|at| (at * subpixels).round());
+            // Written so that NaN gives up.
+            if !(0..2).all(|axis| middle[axis].abs() + half[axis] <= FARTHEST) {
+                return Outline::Rectangle;
+            }
+            let side = |axis: usize, sign: f64| (middle[axis] + sign * half[axis]) as i32;
+            let signs = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+            square.copy_from_slice(&signs.map(|s| [side(0, s[0]), side(1, s[1])]));
+        }
+        let PixelRectangle { min, max } = rectangle;
+        let edge = |pixel: u32| pixel as i32 * HULL_SUBPIXELS;
+        let mut cut = convex_hull(&mut places);
+        for axis in 0..2 {
+            let (low, high) = (edge(min[axis]), edge(max[axis]));
+            cut = cut
+                .and_then(|hull| hull.cut(axis, low, |at| at >= low))
+                .and_then(|hull| hull.cut(axis, high, |at| at <= high));
+        }
+        let Some(hull) = cut else { return Outline::Rectangle };
+        if hull.len < 3 {
+            return Outline::Nowhere;
+        }
+        // A convex polygon that holds the middles of the pixels in all four corners holds all others.
+        let [columns, rows] = [0, 1].map(|axis| {
+            let middle = HULL_SUBPIXELS / 2;
+            [edge(min[axis]) + middle, edge(max[axis]) - middle]
+        });
+        if columns.into_iter().all(|x| rows.into_iter().all(|y| hull.holds([x, y]))) {
+            return Outline::Rectangle;
+        }
+        let depth = floor_f32(f64::from(depth) - margins.flat_depth).max(0.0);
+        Outline::Within { hull, depth }
+    }
+}
+
+/// The convex hull of `places`, which are sorted for it; no three corners in a line. `None` where it has
+/// more than [`MOST_HULL_CORNERS`], which squares about eight places have not.
+fn convex_hull(places: &mut [[i32; 2]]) -> Option<Hull> {
+    places.sort_unstable();
+    let turns = |a: [i32; 2], b: [i32; 2], c: [i32; 2]| {
+        let along = |i: usize, to: [i32; 2]| i64::from(to[i]) - i64::from(a[i]);
+        along(0, b) * along(1, c) - along(1, b) * along(0, c) > 0
+    };
+    let mut chain: Vec<[i32; 2]> = Vec::with_capacity(2 * MOST_HULL_CORNERS);
+    // The chain of one side from the first place to the last, then that of the other side back.
+    let mut side = |place: [i32; 2], first: usize| {
+        while chain.len() >= first + 2
+            && !turns(chain[chain.len() - 2], chain[chain.len() - 1], place)
+        {
+            chain.pop();
+        }
+        chain.push(place);
+        chain.len()
+    };
+    let mut len = 0;
+    for &place in &*places {
+        len = side(place, 0);
+    }
+    let turn = len - 1;
+    for &place in places.iter().rev().skip(1) {
+        side(place, turn);
+    }
+    // The first place ends the second chain as well.
+    chain.pop();
+    let mut hull = Hull::EMPTY;
+    chain.into_iter().all(|corner| hull.push(corner)).then_some(hull)
+}
