@@ -18,10 +18,17 @@ pub(crate) const SCENES: [&str; 5] = ["bunnies", "powerplant", "city", "rooms", 
 pub(crate) const ORACLES: [&str; 6] =
     ["sim", "hierarchical-z", "hardware", "pyramid", "read-back", "always"];
 
+/// Names another device to run the tests on, by a part of its name: the snapshots of what lavapipe makes
+/// of a scene then fail, and nothing else may.
+pub(crate) const ADAPTER: &str = "PLAINSIGHT_ADAPTER";
+
 /// The device, opened once. A test that needs one fails without it.
 pub(crate) fn gpu() -> &'static Arc<Gpu> {
     static GPU: OnceLock<Arc<Gpu>> = OnceLock::new();
-    GPU.get_or_init(|| Gpu::open(None).unwrap_or_else(|error| panic!("{error}")))
+    GPU.get_or_init(|| {
+        let named = std::env::var(ADAPTER).ok();
+        Gpu::open(named.as_deref()).unwrap_or_else(|error| panic!("{error}"))
+    })
 }
 
 /// The second device, a very different one. `tests/run.sh` fetches it and names both to the loader.

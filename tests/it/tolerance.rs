@@ -14,7 +14,7 @@ use plainsight::run::{
 use plainsight::scene::generate::{HARD, Knobs, build};
 use plainsight_reference::{Fate, Tolerance};
 
-use crate::common::{SCENES, gpu, hardware, oracle, swiftshader, world};
+use crate::common::{ADAPTER, SCENES, gpu, hardware, oracle, swiftshader, world};
 
 /// Share of the visible parts that must be *must*: a tolerance under which nearly all is *may* proves
 /// nothing.
@@ -112,12 +112,14 @@ fn swiftshader_keeps_to_its_own() {
 
 /// How many parts each tolerance would have come out wrong, and what share of *must* it leaves: what the
 /// devices' tolerances were chosen by. By hand: `cargo test --release --test it -- --ignored tolerances
-/// --nocapture`.
+/// --nocapture`; `PLAINSIGHT_ADAPTER=nvidia` measures that device alone.
 #[test]
 #[ignore = "a measurement, not a test"]
 #[allow(clippy::print_stderr)]
 fn tolerances_side_by_side() {
-    for gpu in [gpu(), swiftshader()] {
+    let named = std::env::var_os(ADAPTER).is_some();
+    let devices = if named { vec![gpu()] } else { vec![gpu(), swiftshader()] };
+    for gpu in devices {
         eprintln!("{}", gpu.name());
         let frames: Vec<(World, Vec<Seen>)> = worlds()
             .map(|world| {
