@@ -2,7 +2,7 @@
 //! corpus. Any bytes are a case, but for fewer than one vertex.
 
 use plainsight_reference::fast::{Instance, Mesh, Options, SimdLevel};
-use plainsight_reference::{Draw, Faces, Image, Viewport, fast, naive};
+use plainsight_reference::{DepthOrder, Draw, Faces, Image, Viewport, fast, naive};
 
 /// Bytes of a vertex: three coordinates, and the corners of a triangle.
 const RECORD: usize = 15;
@@ -61,13 +61,18 @@ pub(crate) fn check(bytes: &[u8]) -> Result<(), String> {
         |byte: u8| if flags & 1 == 0 { u32::from(byte % 64) + 1 } else { u32::from(byte) + 1 };
     let viewport = Viewport { width: side(width), height: side(height) };
     let faces = if flags & 2 == 0 { Faces::Both } else { Faces::CounterClockwise };
-    let first = if flags & 4 == 0 { IDENTITY } else { CAMERA };
+    let mut first = if flags & 4 == 0 { IDENTITY } else { CAMERA };
+    let order = if flags & 8 == 0 { DepthOrder::Forward } else { DepthOrder::Reversed };
+    if order == DepthOrder::Reversed {
+        // z − w goes from −w to 0.
+        (0..4).for_each(|column| first[4 * column + 2] -= first[4 * column + 3]);
+    }
     let mut second = first;
     let factor = f32::from(scale) / 64.0;
     second.iter_mut().take(8).for_each(|element| *element *= factor);
     let ranks: Vec<u32> = (0..count as u32).rev().collect();
     let mesh = Mesh::new(&positions, &triangles, &ranks);
-    let mut expected = Image::new(viewport);
+    let mut expected = Image::ordered(viewport, order);
     let mut instances = Vec::new();
     for (i, clip_from_object) in [first, second].into_iter().enumerate() {
         let first_draw = (i * count) as u32;
@@ -87,7 +92,7 @@ pub(crate) fn check(bytes: &[u8]) -> Result<(), String> {
     }
     for level in SimdLevel::available() {
         for skip_hidden in [true, false] {
-            let mut image = Image::new(viewport);
+            let mut image = Image::ordered(viewport, order);
             fast::draw(&mut image, &instances, Options { level, skip_hidden });
             if let Some(sample) =
                 (0..image.sample_count()).find(|&s| image.word(s) != expected.word(s))

@@ -1,6 +1,7 @@
 //! Clipping in clip space, by Sutherland & Hodgman 1974 (*Reentrant polygon clipping*), in f32.
 
 use crate::image::Viewport;
+use crate::order::DepthOrder;
 
 /// x, y, z, w.
 pub(crate) type ClipVertex = [f32; 4];
@@ -35,6 +36,7 @@ impl Polygon {
 pub(crate) struct Clipper {
     across: f32,
     down: f32,
+    order: DepthOrder,
 }
 
 /// Pixels from the window's origin to the end of the guard band, less one that the rounding of new
@@ -44,19 +46,21 @@ const GUARD_PIXELS: f32 = 32_767.0;
 impl Clipper {
     /// Window = ndc·half + half, so ndc = (guard − half) / half keeps the far side within the guard;
     /// the near side, half further, is within it all the more.
-    pub(crate) fn new(viewport: Viewport) -> Self {
+    pub(crate) fn new(viewport: Viewport, order: DepthOrder) -> Self {
         let factor = |pixels: u32| {
             let half = pixels as f32 * 0.5;
             (GUARD_PIXELS - half) / half
         };
-        Self { across: factor(viewport.width), down: factor(viewport.height) }
+        Self { across: factor(viewport.width), down: factor(viewport.height), order }
     }
 
     /// Distance to plane `plane`, not negative inside.
     fn distance(&self, plane: usize, [x, y, z, w]: ClipVertex) -> f32 {
         match plane {
-            0 => z,
-            1 => w - z,
+            0 if self.order == DepthOrder::Forward => z,
+            0 => w + z,
+            1 if self.order == DepthOrder::Forward => w - z,
+            1 => -z,
             2 => self.across * w + x,
             3 => self.across * w - x,
             4 => self.down * w + y,
@@ -78,7 +82,7 @@ impl Clipper {
 
     /// The part of the triangle inside all planes; `None` where nothing is left, or where a coordinate
     /// is not finite, or where a corner's w has no finite reciprocal. The last can be only where the
-    /// corner coincides with the eye within rounding (z ≥ 0, z ≤ w and |x|, |y| ≤ k·w leave nothing
+    /// corner coincides with the eye within rounding (near ≤ z ≤ far and |x|, |y| ≤ k·w leave nothing
     /// but the origin at w = 0), where a triangle has no image.
     pub(crate) fn clip(&self, triangle: [ClipVertex; 3]) -> Option<Polygon> {
         if !triangle.iter().flatten().all(|c| c.is_finite()) {

@@ -28,22 +28,23 @@ pub(crate) const BLOCK: usize = 8;
 /// Blocks along a side of a region.
 pub(crate) const BLOCKS: usize = REGION / BLOCK;
 
-/// A sample without a fragment: depth 1 and no draw index. Bits of non-negative floats order like the
-/// numbers, so the smaller word is the nearer fragment, then the lower draw index. Depths reach at
-/// most 1, so words are never negative and may be compared as signed numbers.
+use crate::order::{DepthOrder, FARTHEST};
+
+/// A sample without a fragment: the farthest depth and no draw index. Keys of depths order like the
+/// numbers, so the smaller word is the nearer fragment, then the lower draw index. Keys reach at most
+/// the bits of 1, so words are never negative and may be compared as signed numbers.
 const CLEAR: i64 = (FARTHEST as i64) << 32;
 /// A sample of a region that lies outside the image: nearer than everything, so it takes no fragment
 /// and does not hold the farthest depth of its block back.
 const OUTSIDE: i64 = 0;
-/// Bits of depth 1.
-const FARTHEST: u32 = 1.0_f32.to_bits();
 
 /// A z-buffer with draw indices.
 #[derive(Clone, Debug)]
 pub struct Image {
     viewport: Viewport,
+    order: DepthOrder,
     words: Vec<i64>,
-    /// Per block, bits of a depth that none of its samples lies behind.
+    /// Per block, the key of a depth that none of its samples lies behind.
     far: Vec<u32>,
     /// Per block, whether `far` may be more than the farthest depth.
     stale: Vec<bool>,
@@ -51,6 +52,7 @@ pub struct Image {
 
 /// One region of an image that is being drawn.
 pub(crate) struct Region<'a> {
+    pub(crate) order: DepthOrder,
     /// Its first column and row in the image.
     pub(crate) origin: [i32; 2],
     /// Columns and rows of it that lie within the image, at least 1.
@@ -62,25 +64,35 @@ pub(crate) struct Region<'a> {
 
 impl PartialEq for Image {
     fn eq(&self, other: &Self) -> bool {
-        self.viewport == other.viewport && self.words == other.words
+        (self.viewport, self.order) == (other.viewport, other.order) && self.words == other.words
     }
 }
 
 impl Eq for Image {}
 
 impl Image {
-    /// A cleared image.
+    /// A cleared image whose depth runs forward.
     ///
     /// # Panics
     /// For a side of 0 or above [`Viewport::MAX_SIDE`].
     #[must_use]
     pub fn new(viewport: Viewport) -> Self {
+        Self::ordered(viewport, DepthOrder::Forward)
+    }
+
+    /// A cleared image whose depth runs as told.
+    ///
+    /// # Panics
+    /// For a side of 0 or above [`Viewport::MAX_SIDE`].
+    #[must_use]
+    pub fn ordered(viewport: Viewport, order: DepthOrder) -> Self {
         let Viewport { width, height } = viewport;
         let legal = 1..=Viewport::MAX_SIDE;
         assert!(legal.contains(&width) && legal.contains(&height), "{width}×{height} pixels");
         let regions = (width as usize).div_ceil(REGION) * (height as usize).div_ceil(REGION);
         let mut image = Self {
             viewport,
+            order,
             words: vec![OUTSIDE; regions * REGION * REGION],
             far: vec![0; regions * BLOCKS * BLOCKS],
             stale: vec![false; regions * BLOCKS * BLOCKS],
@@ -95,6 +107,12 @@ impl Image {
         self.viewport
     }
 
+    /// Which way its depth runs.
+    #[must_use]
+    pub fn order(&self) -> DepthOrder {
+        self.order
+    }
+
     /// Forgets every fragment.
     pub fn clear(&mut self) {
         self.regions().for_each(|mut region| region.clear());
@@ -103,6 +121,7 @@ impl Image {
     /// The regions, row by row.
     pub(crate) fn regions(&mut self) -> impl Iterator<Item = Region<'_>> {
         let (width, height) = (self.viewport.width as usize, self.viewport.height as usize);
+        let order = self.order;
         let across = width.div_ceil(REGION);
         let words = self.words.chunks_exact_mut(REGION * REGION);
         let far = self.far.chunks_exact_mut(BLOCKS * BLOCKS);
@@ -110,7 +129,7 @@ impl Image {
         words.zip(far).zip(stale).enumerate().map(move |(i, ((words, far), stale))| {
             let (x, y) = (i % across * REGION, i / across * REGION);
             let size = [(width - x).min(REGION) as i32, (height - y).min(REGION) as i32];
-            Region { origin: [x as i32, y as i32], size, words, far, stale }
+            Region { order, origin: [x as i32, y as i32], size, words, far, stale }
         })
     }
 
@@ -138,7 +157,8 @@ impl Image {
         self.words[self.place(column, row)] as u64
     }
 
-    /// The word of a sample (row × width + column): depth bits, then draw index plus one.
+    /// The word of a sample (row × width + column): the key of its depth ([`DepthOrder::key`]), then draw
+    /// index plus one.
     #[must_use]
     pub fn word(&self, sample: usize) -> u64 {
         let width = self.viewport.width as usize;
@@ -166,12 +186,12 @@ impl Image {
     /// Depth at a sample (row × width + column).
     #[must_use]
     pub fn depth(&self, sample: usize) -> f32 {
-        depth_of(self.word(sample))
+        self.depth_of(self.word(sample))
     }
 
     /// All depths, row by row.
     pub fn depths(&self) -> impl Iterator<Item = f32> + '_ {
-        self.words().map(depth_of)
+        self.words().map(|word| self.depth_of(word))
     }
 
     /// Draw index at a sample; `None` where nothing was drawn.
@@ -198,9 +218,9 @@ impl Image {
     /// count nothing.
     #[must_use]
     pub fn count_rectangle(&self, min: [u32; 2], max: [u32; 2], depth: f32) -> u64 {
-        self.near_blocks(min, max, depth)
+        self.near_blocks(min, max, self.order.key(depth))
             .map(|[x0, y0, x1, y1]| {
-                let passes = |word: &&i64| depth <= depth_of(**word as u64);
+                let passes = |word: &&i64| depth <= self.depth_of(**word as u64);
                 (y0..y1)
                     .flat_map(|row| self.pieces(row, x0, x1))
                     .map(|piece| piece.iter().filter(passes).count() as u64)
@@ -212,20 +232,20 @@ impl Image {
     /// Whether [`Image::count_rectangle`] is above zero.
     #[must_use]
     pub fn any_rectangle(&self, min: [u32; 2], max: [u32; 2], depth: f32) -> bool {
-        self.near_blocks(min, max, depth).any(|[x0, y0, x1, y1]| {
+        self.near_blocks(min, max, self.order.key(depth)).any(|[x0, y0, x1, y1]| {
             (y0..y1)
                 .flat_map(|row| self.pieces(row, x0, x1))
-                .any(|piece| piece.iter().any(|&word| depth <= depth_of(word as u64)))
+                .any(|piece| piece.iter().any(|&word| depth <= self.depth_of(word as u64)))
         })
     }
 
-    /// The blocks that meet the half-open rectangle and are not wholly nearer than `depth`, each cut to
+    /// The blocks that meet the half-open rectangle and are not wholly nearer than the depth of `near`, a key, each cut to
     /// the rectangle: first column and row, then the ends.
     pub(crate) fn near_blocks(
         &self,
         min: [u32; 2],
         max: [u32; 2],
-        depth: f32,
+        near: u32,
     ) -> impl Iterator<Item = [usize; 4]> {
         let Viewport { width, height } = self.viewport;
         let (x0, x1) = (min[0] as usize, max[0].min(width) as usize);
@@ -233,8 +253,12 @@ impl Image {
         let columns = if x0 < x1 { x0 / BLOCK..x1.div_ceil(BLOCK) } else { 0..0 };
         let rows = if y0 < y1 { y0 / BLOCK..y1.div_ceil(BLOCK) } else { 0..0 };
         rows.flat_map(move |row| columns.clone().map(move |column| (column * BLOCK, row * BLOCK)))
-            .filter(move |&(x, y)| depth <= f32::from_bits(self.far[self.block(x, y)]))
+            .filter(move |&(x, y)| near <= self.far[self.block(x, y)])
             .map(move |(x, y)| [x0.max(x), y0.max(y), x1.min(x + BLOCK), y1.min(y + BLOCK)])
+    }
+
+    fn depth_of(&self, word: u64) -> f32 {
+        self.order.depth((word >> 32) as u32)
     }
 
     fn block(&self, column: usize, row: usize) -> usize {
@@ -268,10 +292,6 @@ impl Region<'_> {
         }
         self.stale.fill(false);
     }
-}
-
-fn depth_of(word: u64) -> f32 {
-    f32::from_bits((word >> 32) as u32)
 }
 
 fn draw_index_of(word: u64) -> Option<u32> {

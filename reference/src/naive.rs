@@ -4,13 +4,15 @@
 
 use crate::draw::Draw;
 use crate::image::{Image, Viewport};
+use crate::order::DepthOrder;
 use crate::window::{Oriented, SUBPIXELS, Window, depth, edge, top_left};
 
 /// Draws into `image`.
 pub fn draw(image: &mut Image, draw: &Draw<'_>) {
     let viewport = image.viewport();
-    fragments(viewport, draw, |column, row, depth, id| {
-        image.lower(column, row, u64::from(depth.to_bits()) << 32 | u64::from(id));
+    let order = image.order();
+    fragments(viewport, order, draw, |column, row, depth, id| {
+        image.lower(column, row, u64::from(order.key(depth)) << 32 | u64::from(id));
     });
 }
 
@@ -19,16 +21,21 @@ pub fn draw(image: &mut Image, draw: &Draw<'_>) {
 #[must_use]
 pub fn count(image: &Image, draw: &Draw<'_>) -> u64 {
     let mut passed = 0;
-    fragments(image.viewport(), draw, |column, row, depth, _| {
-        let stored = f32::from_bits((image.word_at(column, row) >> 32) as u32);
-        passed += u64::from(depth <= stored);
+    fragments(image.viewport(), image.order(), draw, |column, row, depth, _| {
+        let stored = (image.word_at(column, row) >> 32) as u32;
+        passed += u64::from(image.order().key(depth) <= stored);
     });
     passed
 }
 
-fn fragments(viewport: Viewport, draw: &Draw<'_>, mut emit: impl FnMut(usize, usize, f32, u32)) {
+fn fragments(
+    viewport: Viewport,
+    order: DepthOrder,
+    draw: &Draw<'_>,
+    mut emit: impl FnMut(usize, usize, f32, u32),
+) {
     assert_eq!(draw.triangles.len(), draw.ranks.len(), "one rank a triangle");
-    let window = Window::new(viewport);
+    let window = Window::new(viewport, order);
     for (i, triangle) in draw.triangles.iter().enumerate() {
         let corners = triangle.map(|vertex| draw.clip_vertex(vertex));
         let Some(polygon) = window.clipper.clip(corners) else { continue };

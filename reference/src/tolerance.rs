@@ -29,6 +29,7 @@
 
 use crate::draw::Draw;
 use crate::image::Viewport;
+use crate::order::{DepthOrder, FARTHEST};
 use crate::window::{Oriented, SUBPIXELS, Window, WindowVertex, depth, edge, top_left};
 
 /// How far a device's image may stand from the raster rules.
@@ -67,8 +68,6 @@ pub struct Fates {
     pub decided: Vec<Option<u32>>,
 }
 
-/// Bits of depth 1: what a cleared sample has.
-const FARTHEST: u32 = 1.0_f32.to_bits();
 /// No part.
 const NOBODY: u32 = u32::MAX;
 /// Lengths of edges are rounded once, and products with ε once more: four units of 2⁻⁵³ are more than
@@ -101,7 +100,7 @@ impl Rivals {
     }
 }
 
-/// A triangle at a sample: bits of the depths between which it is there.
+/// A triangle at a sample: keys of the depths between which it is there.
 struct Fragment {
     sample: usize,
     near: u32,
@@ -114,31 +113,46 @@ struct Fragment {
 /// # Panics
 /// For 2³² − 1 parts or more, and where ranks and triangles of a draw are not as many.
 #[must_use]
-pub fn fates(viewport: Viewport, parts: &[Draw<'_>], tolerance: Tolerance) -> Fates {
+pub fn fates(
+    viewport: Viewport,
+    order: DepthOrder,
+    parts: &[Draw<'_>],
+    tolerance: Tolerance,
+) -> Fates {
     assert!(parts.len() < NOBODY as usize, "{} parts", parts.len());
     let samples = viewport.width as usize * viewport.height as usize;
     let mut nearest = vec![FARTHEST; samples];
     let nobody = Rivals { first: FARTHEST, part: NOBODY, second: FARTHEST };
     let mut rivals = vec![nobody; samples];
     for (part, draw) in (0..).zip(parts) {
-        fragments(viewport, draw, tolerance, &mut |Fragment { sample, near, far, eroded }| {
-            rivals[sample].meet(part, near);
-            if eroded {
-                nearest[sample] = nearest[sample].min(far);
-            }
-        });
+        fragments(
+            (viewport, order),
+            draw,
+            tolerance,
+            &mut |Fragment { sample, near, far, eroded }| {
+                rivals[sample].meet(part, near);
+                if eroded {
+                    nearest[sample] = nearest[sample].min(far);
+                }
+            },
+        );
     }
     let mut decided = vec![None; samples];
     let fate = |(part, draw): (u32, &Draw<'_>)| {
         let (mut must, mut reaches) = (false, false);
-        fragments(viewport, draw, tolerance, &mut |Fragment { sample, near, far, eroded }| {
-            // Depth 1 loses against a cleared sample.
-            reaches |= near < FARTHEST && near <= nearest[sample];
-            if eroded && far < rivals[sample].of(part) {
-                must = true;
-                decided[sample] = Some(part);
-            }
-        });
+        fragments(
+            (viewport, order),
+            draw,
+            tolerance,
+            &mut |Fragment { sample, near, far, eroded }| {
+                // The farthest depth loses against a cleared sample.
+                reaches |= near < FARTHEST && near <= nearest[sample];
+                if eroded && far < rivals[sample].of(part) {
+                    must = true;
+                    decided[sample] = Some(part);
+                }
+            },
+        );
         match (must, reaches) {
             (true, _) => Fate::Must,
             (false, true) => Fate::May,
@@ -151,19 +165,19 @@ pub fn fates(viewport: Viewport, parts: &[Draw<'_>], tolerance: Tolerance) -> Fa
 
 /// Every sample at which a triangle of `draw` may be.
 fn fragments(
-    viewport: Viewport,
+    (viewport, order): (Viewport, DepthOrder),
     draw: &Draw<'_>,
     tolerance: Tolerance,
     emit: &mut dyn FnMut(Fragment),
 ) {
     assert_eq!(draw.triangles.len(), draw.ranks.len(), "one rank a triangle");
-    let window = Window::new(viewport);
+    let window = Window::new(viewport, order);
     for triangle in draw.triangles {
         let corners = triangle.map(|vertex| draw.clip_vertex(vertex));
         let Some(polygon) = window.clipper.clip(corners) else { continue };
         let clipped = corners.iter().any(|&corner| window.clipper.outside(corner) != 0);
         let ulps = if clipped { tolerance.clipped_ulps } else { tolerance.ulps };
-        let here = Allowed { viewport, pixels: tolerance.pixels, ulps };
+        let here = Allowed { viewport, order, pixels: tolerance.pixels, ulps };
         let vertices: Vec<WindowVertex> =
             polygon.corners().iter().map(|&corner| window.vertex(corner)).collect();
         for pair in vertices[1..].windows(2) {
@@ -182,6 +196,7 @@ fn fragments(
 /// What is allowed of one triangle.
 struct Allowed {
     viewport: Viewport,
+    order: DepthOrder,
     pixels: f64,
     ulps: u32,
 }
@@ -218,7 +233,8 @@ impl Allowed {
     /// Depths between which the triangle is where the reference has `depth`.
     fn depths(&self, depth: f64, slope: f64, [low, high]: [f32; 2]) -> [u32; 2] {
         let delta = slope * self.pixels;
-        let within = |depth: f64| (depth.clamp(f64::from(low), f64::from(high)) as f32).to_bits();
+        let within =
+            |depth: f64| self.order.key(depth.clamp(f64::from(low), f64::from(high)) as f32);
         [
             within(depth - delta).saturating_sub(self.ulps),
             (within(depth + delta) + self.ulps).min(FARTHEST),
@@ -233,7 +249,7 @@ impl Allowed {
             [f64::from(b.x) - f64::from(a.x), f64::from(b.y) - f64::from(a.y)]
         };
         let z = v.map(|v| v.z);
-        let range = [z.into_iter().fold(1.0, f32::min), z.into_iter().fold(0.0, f32::max)];
+        let range = extremes(z);
         // Edge value i falls by its Δy and grows by its Δx a sub-pixel.
         let along = |axis: usize| {
             let sum: f64 = (0..3).map(|i| difference(i)[axis] * f64::from(z[i])).sum();
@@ -256,8 +272,8 @@ impl Allowed {
             }
             let at = e.map(|e| e as f64);
             let (near, far) = if exact {
-                let bits = depth(at, z, area).to_bits();
-                (bits.saturating_sub(self.ulps), (bits + self.ulps).min(FARTHEST))
+                let key = self.order.key(depth(at, z, area));
+                (key.saturating_sub(self.ulps), (key + self.ulps).min(FARTHEST))
             } else {
                 let plane = ((at[0] * f64::from(z[0]) + at[1] * f64::from(z[1]))
                     + at[2] * f64::from(z[2]))
@@ -270,10 +286,8 @@ impl Allowed {
 
     /// A triangle without area: it may cover what is within ε of its sides, at any of its depths.
     fn line(&self, v: [WindowVertex; 3], emit: &mut dyn FnMut(Fragment)) {
-        let z = v.map(|v| v.z);
-        let low = z.into_iter().fold(1.0, f32::min).to_bits().saturating_sub(self.ulps);
-        let high = z.into_iter().fold(0.0, f32::max).to_bits();
-        let far = (high + self.ulps).min(FARTHEST);
+        let [low, high] = extremes(v.map(|v| v.z)).map(|z| self.order.key(z));
+        let (low, far) = (low.saturating_sub(self.ulps), (high + self.ulps).min(FARTHEST));
         for (sample, at) in self.samples(&v) {
             let near_side = |i: usize| {
                 distance(v[i], v[(i + 1) % 3], at) <= self.reach() * (1.0 + LENGTH_SLACK)
@@ -283,6 +297,11 @@ impl Allowed {
             }
         }
     }
+}
+
+/// The lowest and the highest of three depths.
+fn extremes([a, b, c]: [f32; 3]) -> [f32; 2] {
+    [a.min(b).min(c), a.max(b).max(c)]
 }
 
 /// From a point to a segment, sub-pixels; a few f64 roundings.

@@ -4,6 +4,7 @@
 use crate::clip::{ClipVertex, Clipper, Polygon};
 use crate::draw::Faces;
 use crate::image::Viewport;
+use crate::order::DepthOrder;
 
 /// Sub-pixels in a pixel.
 pub(crate) const SUBPIXELS: i64 = 256;
@@ -11,7 +12,7 @@ pub(crate) const SUBPIXELS: i64 = 256;
 /// No window coordinate is farther from the origin: the ±2¹⁵ pixels that the integers are sized for.
 const BAND_PIXELS: f32 = 32_768.0;
 
-/// A snapped vertex: sub-pixels from the window's top left corner, and depth in [0, 1].
+/// A snapped vertex: sub-pixels from the window's top left corner, and depth between the planes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct WindowVertex {
     pub(crate) x: i32,
@@ -24,12 +25,14 @@ pub(crate) struct WindowVertex {
 pub(crate) struct Window {
     pub(crate) clipper: Clipper,
     half: [f32; 2],
+    /// Depth at the near plane and at the far one.
+    range: [f32; 2],
 }
 
 impl Window {
-    pub(crate) fn new(viewport: Viewport) -> Self {
+    pub(crate) fn new(viewport: Viewport, order: DepthOrder) -> Self {
         let half = [viewport.width as f32 * 0.5, viewport.height as f32 * 0.5];
-        Self { clipper: Clipper::new(viewport), half }
+        Self { clipper: Clipper::new(viewport, order), half, range: order.range() }
     }
 
     /// The written order, each operation f32 and unfused.
@@ -38,7 +41,7 @@ impl Window {
         let column = (x * r) * self.half[0] + self.half[0];
         let row = (y * r) * -self.half[1] + self.half[1];
         // Adding zero turns −0 into +0.
-        let depth = (z * r).clamp(0.0, 1.0) + 0.0;
+        let depth = (z * r).clamp(self.range[0], self.range[1]) + 0.0;
         // A vertex made by clipping lies within the band but for an edge whose ends differ by more than
         // 2²⁴ in size, where f32 interpolation means nothing. The clamp keeps the integers in range,
         // and equal vertices equal, there too.

@@ -2,7 +2,7 @@
 //! number of threads, with and without leaving hidden clusters out.
 
 use plainsight_reference::fast::{Instance, Mesh, Options, SimdLevel};
-use plainsight_reference::{Draw, Faces, Image, Viewport, fast, naive};
+use plainsight_reference::{DepthOrder, Draw, Faces, Image, Viewport, fast, naive};
 use proptest::prelude::*;
 
 const IDENTITY: [f32; 16] =
@@ -30,6 +30,14 @@ fn perspective(scale: f32, [x, y, z]: [f32; 3], turn: f32) -> [f32; 16] {
         column([x, y, z], 1.0),
     ];
     std::array::from_fn(|i| columns[i / 4][i % 4])
+}
+
+/// The matrix for a depth order: z − w, which goes from −w to 0, where z goes from 0 to w.
+fn ordered(mut m: [f32; 16], order: DepthOrder) -> [f32; 16] {
+    if order == DepthOrder::Reversed {
+        (0..4).for_each(|column| m[4 * column + 2] -= m[4 * column + 3]);
+    }
+    m
 }
 
 /// A bumpy patch of `side` × `side` squares over ±1.
@@ -99,6 +107,10 @@ fn model() -> impl Strategy<Value = Model> {
         .prop_map(|((positions, triangles), matrices)| Model { positions, triangles, matrices })
 }
 
+fn order() -> impl Strategy<Value = DepthOrder> {
+    prop_oneof![Just(DepthOrder::Forward), Just(DepthOrder::Reversed)]
+}
+
 /// From one pixel to several regions, with odd sizes, and 16 × 16 whose centres lie on the grid of
 /// [`coordinate`].
 fn viewport() -> impl Strategy<Value = Viewport> {
@@ -115,6 +127,7 @@ fn viewport() -> impl Strategy<Value = Viewport> {
 /// samples, hash and bounds.
 fn compare(
     viewport: Viewport,
+    order: DepthOrder,
     models: &[Model],
     faces: Faces,
     ways: impl Iterator<Item = (SimdLevel, bool, usize)>,
@@ -127,7 +140,7 @@ fn compare(
             (0..count).map(|i| count - 1 - i).collect()
         })
         .collect();
-    let mut expected = Image::new(viewport);
+    let mut expected = Image::ordered(viewport, order);
     let meshes: Vec<Mesh> = models
         .iter()
         .zip(&ranks)
@@ -136,7 +149,8 @@ fn compare(
     let mut instances = Vec::new();
     let mut first_draw = 0;
     for ((model, ranks), mesh) in models.iter().zip(&ranks).zip(&meshes) {
-        for &clip_from_object in &model.matrices {
+        for &matrix in &model.matrices {
+            let clip_from_object = ordered(matrix, order);
             let (positions, triangles) = (&model.positions, &model.triangles);
             let draw = Draw { positions, triangles, ranks, first_draw, clip_from_object, faces };
             naive::draw(&mut expected, &draw);
@@ -144,7 +158,7 @@ fn compare(
             first_draw += ranks.len() as u32;
         }
     }
-    let mut image = Image::new(viewport);
+    let mut image = Image::ordered(viewport, order);
     for (level, skip_hidden, threads) in ways {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let options = Options { level, skip_hidden };
@@ -165,7 +179,7 @@ fn compare(
             return Err(format!("{way}: hash or bounds"));
         }
         // Instance by instance, the last first, onto what is there.
-        let mut other = Image::new(viewport);
+        let mut other = Image::ordered(viewport, order);
         pool.install(|| {
             for instance in instances.iter().rev() {
                 fast::draw(&mut other, std::slice::from_ref(instance), options);
@@ -190,13 +204,14 @@ proptest! {
     #[test]
     fn fast_equals_naive(
         viewport in viewport(),
+        order in order(),
         models in prop::collection::vec(model(), 1..4),
         both in prop::bool::weighted(0.7),
         threads in 1_usize..4,
     ) {
         let faces = if both { Faces::Both } else { Faces::CounterClockwise };
         let ways = SimdLevel::available().into_iter().flat_map(|level| [(level, true, threads), (level, false, threads)]);
-        if let Err(error) = compare(viewport, &models, faces, ways) {
+        if let Err(error) = compare(viewport, order, &models, faces, ways) {
             prop_assert!(false, "{error}");
         }
     }
@@ -222,10 +237,13 @@ fn a_crowded_picture_is_equal_in_every_way() {
         .collect();
     let triangles = (0..30).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let large = Model { positions, triangles, matrices: vec![IDENTITY] };
-    for (width, height) in [(333, 251), (4096, 33), (77, 4096)] {
+    let (forward, reversed) = (DepthOrder::Forward, DepthOrder::Reversed);
+    let ways =
+        [(333, 251, forward), (4096, 33, reversed), (77, 4096, forward), (251, 333, reversed)];
+    for (width, height, order) in ways {
         let viewport = Viewport { width, height };
         let models = [dense.clone(), large.clone()];
-        compare(viewport, &models, Faces::Both, all_ways()).unwrap();
+        compare(viewport, order, &models, Faces::Both, all_ways()).unwrap();
     }
 }
 
@@ -238,7 +256,7 @@ fn a_large_picture_is_equal_at_every_level() {
     let viewport = Viewport { width: 4096, height: 4095 };
     let model = Model { positions, triangles, matrices };
     let ways = SimdLevel::available().into_iter().map(|level| (level, true, 2));
-    compare(viewport, &[model], Faces::Both, ways).unwrap();
+    compare(viewport, DepthOrder::Forward, &[model], Faces::Both, ways).unwrap();
 }
 
 /// Edges from near to very far away: coordinates stay in range, and both renderers agree.
@@ -250,7 +268,10 @@ fn edges_too_uneven_for_f32_stay_in_range() {
             let positions = vec![[0.1, 0.2, -5.0], [-0.3, 0.1, -4.0], [x, y, z]];
             let matrices = vec![IDENTITY, perspective(1.0, [0.0; 3], 0.0)];
             let model = Model { positions, triangles: vec![[0, 1, 2]], matrices };
-            compare(viewport, &[model], Faces::Both, all_ways()).unwrap();
+            for order in [DepthOrder::Forward, DepthOrder::Reversed] {
+                compare(viewport, order, std::slice::from_ref(&model), Faces::Both, all_ways())
+                    .unwrap();
+            }
         }
     }
 }

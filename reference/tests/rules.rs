@@ -1,7 +1,7 @@
 //! The raster rules as properties: watertight edges, exact coverage, exact depth, order independence,
 //! and counting. What the fast renderer owes the naive one is in `fast.rs`.
 
-use plainsight_reference::{Draw, Faces, Image, Viewport, fast, naive};
+use plainsight_reference::{DepthOrder, Draw, Faces, Image, Viewport, fast, naive};
 use proptest::prelude::*;
 
 const IDENTITY: [f32; 16] =
@@ -26,6 +26,18 @@ const PERSPECTIVE: [f32; 16] = [
     0.0,
 ];
 
+/// The matrix for a depth order: z − w, which goes from −w to 0, where z goes from 0 to w.
+fn ordered(mut m: [f32; 16], order: DepthOrder) -> [f32; 16] {
+    if order == DepthOrder::Reversed {
+        (0..4).for_each(|column| m[4 * column + 2] -= m[4 * column + 3]);
+    }
+    m
+}
+
+fn order() -> impl Strategy<Value = DepthOrder> {
+    prop_oneof![Just(DepthOrder::Forward), Just(DepthOrder::Reversed)]
+}
+
 fn draw<'a>(m: [f32; 16], p: &'a [[f32; 3]], t: &'a [[u32; 3]], ranks: &'a [u32]) -> Draw<'a> {
     Draw {
         positions: p,
@@ -37,11 +49,18 @@ fn draw<'a>(m: [f32; 16], p: &'a [[f32; 3]], t: &'a [[u32; 3]], ranks: &'a [u32]
     }
 }
 
-/// How many triangles cover each sample, drawn one by one.
-fn layers(viewport: Viewport, m: [f32; 16], p: &[[f32; 3]], t: &[[u32; 3]]) -> Vec<u32> {
+/// How many triangles cover each sample, drawn one by one, under the matrix made for the order.
+fn layers(
+    viewport: Viewport,
+    order: DepthOrder,
+    m: [f32; 16],
+    p: &[[f32; 3]],
+    t: &[[u32; 3]],
+) -> Vec<u32> {
+    let m = ordered(m, order);
     let mut layers = vec![0; (viewport.width * viewport.height) as usize];
     for triangle in t {
-        let mut image = Image::new(viewport);
+        let mut image = Image::ordered(viewport, order);
         naive::draw(&mut image, &draw(m, p, std::slice::from_ref(triangle), &[0]));
         for (sample, layer) in layers.iter_mut().enumerate() {
             *layer += u32::from(image.draw_index(sample).is_some());
@@ -96,6 +115,7 @@ proptest! {
     #[test]
     fn a_shared_edge_is_watertight(
         viewport in viewport(),
+        order in order(),
         reach in 1.2_f32..2000.0,
         depth in 1.5_f32..90.0,
         tilt in -0.3_f32..0.3,
@@ -104,7 +124,7 @@ proptest! {
         let r = reach * depth;
         let [a, b, c, d] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
             .map(|[x, y]: [f32; 2]| [(x + shift[0]) * r, (y + shift[1]) * r, -depth + tilt * x]);
-        let covered = layers(viewport, PERSPECTIVE, &[a, b, c, d], &[[0, 1, 2], [0, 2, 3]]);
+        let covered = layers(viewport, order, PERSPECTIVE, &[a, b, c, d], &[[0, 1, 2], [0, 2, 3]]);
         prop_assert!(covered.iter().all(|&layers| layers == 1), "{covered:?}");
     }
 
@@ -133,7 +153,7 @@ proptest! {
         positions.extend(turns.iter().map(|&t| rim(t)));
         let n = turns.len() as u32;
         let triangles: Vec<[u32; 3]> = (0..n).map(|i| [0, 1 + i, 1 + (i + 1) % n]).collect();
-        let covered = layers(viewport, IDENTITY, &positions, &triangles);
+        let covered = layers(viewport, DepthOrder::Forward, IDENTITY, &positions, &triangles);
         prop_assert!(covered.iter().all(|&layers| layers == 1), "{covered:?}");
     }
 
@@ -157,14 +177,22 @@ proptest! {
         };
         let areas = triangles.map(area);
         prop_assume!(areas.iter().all(|&a| a >= 0) || areas.iter().all(|&a| a <= 0));
-        let cut = layers(viewport, IDENTITY, &positions, &triangles);
+        let cut = layers(viewport, DepthOrder::Forward, IDENTITY, &positions, &triangles);
         prop_assert!(cut.iter().all(|&layers| layers <= 1), "{cut:?}");
     }
 
     /// Coverage and depth against rational arithmetic on the snapped vertices.
     #[test]
-    fn coverage_and_depth_are_exact(viewport in viewport(), p in [corner(), corner(), corner()]) {
-        let mut image = Image::new(viewport);
+    fn coverage_and_depth_are_exact(
+        viewport in viewport(), order in order(), p in [corner(), corner(), corner()],
+    ) {
+        // Not the far plane's own depth, which loses against a cleared sample; reversed, depths near
+        // zero have many more bits.
+        let p = p.map(|[x, y, z]| match order {
+            DepthOrder::Forward => [x, y, z],
+            DepthOrder::Reversed => [x, y, -(z * z).max(1e-9)],
+        });
+        let mut image = Image::ordered(viewport, order);
         naive::draw(&mut image, &draw(IDENTITY, &p, &[[0, 1, 2]], &[0]));
         let half = [viewport.width as f32 * 0.5, viewport.height as f32 * 0.5];
         let snap = |v: f32| i128::from((v * 256.0).round_ties_even() as i64);
@@ -190,16 +218,17 @@ proptest! {
     /// The image is a function of what is drawn, not of the order; both renderers count alike.
     #[test]
     fn order_does_not_matter(
-        viewport in viewport(), (positions, triangles) in soup(40), perspective: bool, turn in 0_usize..40,
+        viewport in viewport(), order in order(), (positions, triangles) in soup(40),
+        perspective: bool, turn in 0_usize..40,
     ) {
-        let m = if perspective { PERSPECTIVE } else { IDENTITY };
+        let m = ordered(if perspective { PERSPECTIVE } else { IDENTITY }, order);
         let ranks: Vec<u32> = (0..triangles.len() as u32).collect();
-        let mut image = Image::new(viewport);
+        let mut image = Image::ordered(viewport, order);
         naive::draw(&mut image, &draw(m, &positions, &triangles, &ranks));
         let (mut turned, mut turned_ranks) = (triangles.clone(), ranks.clone());
         turned.rotate_left(turn % triangles.len());
         turned_ranks.rotate_left(turn % triangles.len());
-        let mut other = Image::new(viewport);
+        let mut other = Image::ordered(viewport, order);
         naive::draw(&mut other, &draw(m, &positions, &turned, &turned_ranks));
         prop_assert_eq!(image.hash(), other.hash());
         prop_assert!(image == other);
@@ -235,13 +264,38 @@ fn rational(v: [(i128, i128, f32); 3], x: i128, y: i128) -> Option<(i128, i128)>
 #[test]
 fn near_and_far_are_closed() {
     let viewport = Viewport { width: 8, height: 8 };
-    let covered = |z: f32| {
-        let p = [[-3.0, -1.0, z], [3.0, -1.0, z], [0.0, 3.0, z]];
-        layers(viewport, IDENTITY, &p, &[[0, 1, 2]]).iter().sum::<u32>()
-    };
-    assert_eq!(covered(0.0_f32.next_down()), 0);
-    assert!(covered(0.0) > 0 && covered(1.0_f32.next_down()) > 0);
-    assert_eq!((covered(1.0), covered(1.0_f32.next_up())), (0, 0));
+    for order in [DepthOrder::Forward, DepthOrder::Reversed] {
+        let covered = |z: f32| {
+            let mut image = Image::ordered(viewport, order);
+            let p = [[-3.0, -1.0, z], [3.0, -1.0, z], [0.0, 3.0, z]];
+            naive::draw(&mut image, &draw(IDENTITY, &p, &[[0, 1, 2]], &[0]));
+            image.draw_indices().flatten().count()
+        };
+        let [near, far] = order.range();
+        assert_eq!(covered(near.next_down()), 0);
+        assert!(covered(near) > 0 && covered(far.next_down()) > 0);
+        assert_eq!((covered(far), covered(far.next_up())), (0, 0));
+    }
+}
+
+/// A reversed image is what a device with a reversed buffer stores, its sign turned: written from that
+/// device's words, with depths that only floats near zero tell apart.
+#[test]
+fn reversed_depth_is_a_reversed_device() {
+    let viewport = Viewport { width: 31, height: 17 };
+    let device_depth = |i: u32| 1.0 / (1.0 + 3e7 * f64::from(i)) as f32;
+    let (mut nearest, mut image) = (0.0_f32, Image::ordered(viewport, DepthOrder::Reversed));
+    for i in [900, 901, 5, 899, 3, 3_000_000] {
+        let z = device_depth(i);
+        let p = [[-3.0, -1.0, -z], [3.0, -1.0, -z], [0.0, 3.0, -z]];
+        naive::draw(&mut image, &draw(IDENTITY, &p, &[[0, 1, 2]], &[i]));
+        nearest = nearest.max(z);
+        let sample = 8 * 31 + 15;
+        assert_eq!(DepthOrder::Reversed.on_device(image.depth(sample)), nearest);
+        assert_eq!(image.draw_index(sample).map(device_depth), Some(nearest));
+        assert!(image.any_rectangle([15, 8], [16, 9], -nearest));
+        assert!(!image.any_rectangle([15, 8], [16, 9], (-nearest).next_up()));
+    }
 }
 
 /// Questions: less or equal, within the rectangle only.

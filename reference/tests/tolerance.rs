@@ -1,12 +1,22 @@
 //! Three-valued truth: exact at tolerance zero, monotone in the tolerance, and true of every device that
 //! keeps to the tolerance.
 
-use plainsight_reference::{Draw, Faces, Fate, Image, Tolerance, Viewport, fates, naive};
+use plainsight_reference::{
+    DepthOrder, Draw, Faces, Fate, Fates, Image, Tolerance, Viewport, fates, naive,
+};
 use proptest::prelude::*;
 
 const IDENTITY: [f32; 16] =
     [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+/// z − 1: reversed depth.
+const REVERSED: [f32; 16] =
+    [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 1.0];
 const VIEWPORT: Viewport = Viewport { width: 40, height: 30 };
+
+/// A depth order with the matrix that takes z from 0 to 1 to its depths.
+fn order() -> impl Strategy<Value = (DepthOrder, [f32; 16])> {
+    prop_oneof![Just((DepthOrder::Forward, IDENTITY)), Just((DepthOrder::Reversed, REVERSED))]
+}
 
 /// Parts of up to three triangles of their own, in clip space with w = 1.
 type Parts = Vec<Vec<[[f32; 3]; 3]>>;
@@ -80,8 +90,8 @@ fn image_indices(image: &Image) -> impl Iterator<Item = u32> + '_ {
     image.draw_indices().flatten()
 }
 
-fn picture(draws: &[Draw<'_>]) -> Image {
-    let mut image = Image::new(VIEWPORT);
+fn picture(order: DepthOrder, draws: &[Draw<'_>]) -> Image {
+    let mut image = Image::ordered(VIEWPORT, order);
     draws.iter().for_each(|draw| naive::draw(&mut image, draw));
     image
 }
@@ -91,12 +101,12 @@ proptest! {
 
     /// Must is what wins a sample without a tie, hidden what wins none and ties nowhere.
     #[test]
-    fn exact_at_tolerance_zero(parts in parts()) {
+    fn exact_at_tolerance_zero(parts in parts(), (order, matrix) in order()) {
         let parts = flat(&parts);
-        let draws = draws(&parts, IDENTITY);
-        let found = fates(VIEWPORT, &draws, Tolerance::EXACT);
-        let alone: Vec<Image> = draws.iter().map(|draw| picture(std::slice::from_ref(draw))).collect();
-        let all = picture(&draws);
+        let draws = draws(&parts, matrix);
+        let found = fates(VIEWPORT, order, &draws, Tolerance::EXACT);
+        let alone: Vec<Image> = draws.iter().map(|draw| picture(order, std::slice::from_ref(draw))).collect();
+        let all = picture(order, &draws);
         for (number, image) in alone.iter().enumerate() {
             let (mut wins, mut ties) = (false, false);
             for sample in 0..all.sample_count() {
@@ -124,15 +134,16 @@ proptest! {
 
     /// Widening moves parts from must and hidden into may, and nowhere else.
     #[test]
-    fn wider_is_no_surer(parts in parts(), a in tolerance(), b in tolerance()) {
+    fn wider_is_no_surer(parts in parts(), (order, matrix) in order(), a in tolerance(), b in tolerance()) {
         let wide = Tolerance {
             pixels: a.pixels.max(b.pixels),
             ulps: a.ulps.max(b.ulps),
             clipped_ulps: a.clipped_ulps.max(b.clipped_ulps),
         };
         let parts = flat(&parts);
-        let draws = draws(&parts, IDENTITY);
-        let (narrow, wide) = (fates(VIEWPORT, &draws, a), fates(VIEWPORT, &draws, wide));
+        let draws = draws(&parts, matrix);
+        let of = |tolerance: Tolerance| -> Fates { fates(VIEWPORT, order, &draws, tolerance) };
+        let (narrow, wide) = (of(a), of(wide));
         for (narrow, wide) in narrow.parts.iter().zip(&wide.parts) {
             prop_assert!(narrow == wide || *wide == Fate::May, "{:?} became {:?}", narrow, wide);
         }
@@ -146,6 +157,7 @@ proptest! {
     #[test]
     fn a_device_within_the_tolerance_agrees(
         parts in parts(),
+        (order, exact) in order(),
         (x, y) in (-0.4_f32..0.4, -0.4_f32..0.4),
         lift in 0_u32..40,
     ) {
@@ -154,17 +166,17 @@ proptest! {
         let parts: Parts =
             parts.iter().map(|part| part.iter().map(|t| t.map(squeezed)).collect()).collect();
         let parts = flat(&parts);
-        let (exact, mut moved) = (IDENTITY, IDENTITY);
+        let mut moved = exact;
         moved[12] = x * 2.0 / VIEWPORT.width as f32;
         moved[13] = y * 2.0 / VIEWPORT.height as f32;
-        moved[14] = lift as f32 * f32::EPSILON;
+        moved[14] += lift as f32 * f32::EPSILON;
         // The displacement, and 1/256 pixel for snapping to another place on either side. At a depth of
-        // 0.1 a lift is sixteen ulps.
+        // 0.1, from zero, a lift is sixteen ulps.
         let pixels = f64::from(x.abs().hypot(y.abs())) + 1.5 / 256.0;
         let ulps = lift * 16 + 8;
         let tolerance = Tolerance { pixels, ulps, clipped_ulps: ulps };
-        let found = fates(VIEWPORT, &draws(&parts, exact), tolerance);
-        let device = shown(&parts, &picture(&draws(&parts, moved)));
+        let found = fates(VIEWPORT, order, &draws(&parts, exact), tolerance);
+        let device = shown(&parts, &picture(order, &draws(&parts, moved)));
         for (number, (fate, shows)) in found.parts.iter().zip(device).enumerate() {
             prop_assert!(*fate != Fate::Must || shows, "part {} must show", number);
             prop_assert!(*fate != Fate::Hidden || !shows, "part {} must not show", number);

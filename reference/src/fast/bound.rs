@@ -16,6 +16,7 @@ use fearless_simd::{Simd, f32x16};
 use super::inlined;
 use super::level::LANES;
 use crate::image::Viewport;
+use crate::order::DepthOrder;
 
 /// Roundings of clip coordinates, of a vertex and a corner together (4 + 4), doubled.
 const ROUNDINGS: f32 = 16.0;
@@ -61,12 +62,20 @@ impl Batch {
 pub(crate) struct Projection {
     half: [f32; 2],
     last: [f32; 2],
+    order: DepthOrder,
+    /// Whether w takes part in the distance to the near plane (z + w when reversed, z when not), and in
+    /// that to the far one (−z, w − z): a factor of 1 or 0, exact either way.
+    planes: [f32; 2],
 }
 
 impl Projection {
-    pub(crate) fn new(viewport: Viewport) -> Self {
+    pub(crate) fn new(viewport: Viewport, order: DepthOrder) -> Self {
         let last = [viewport.width as f32, viewport.height as f32];
-        Self { half: [last[0] * 0.5, last[1] * 0.5], last }
+        let planes = match order {
+            DepthOrder::Forward => [0.0, 1.0],
+            DepthOrder::Reversed => [1.0, 0.0],
+        };
+        Self { half: [last[0] * 0.5, last[1] * 0.5], last, order, planes }
     }
 
     /// Places of sixteen clusters.
@@ -106,23 +115,25 @@ impl Projection {
                     ((x + y) + z) + m(12 + row)
                 },
             );
-            seen.add([clip(0), clip(1), clip(2), clip(3)]);
+            seen.add([clip(0), clip(1), clip(2), clip(3)], self.planes);
         }
         let zero = f32x16::splat(s, 0.0);
+        let (e_near, e_far) = (ew * self.planes[0] + ez, ew * self.planes[1] + ez);
         // Distances to the six planes over the corners: all beyond one of them?
         let beyond = inlined(
             #[inline(always)]
             |highest: f32x16<S>, error: f32x16<S>| highest.simd_lt(error * -OUTSIDE),
         );
-        let outside = beyond(seen.high_z, ez)
-            | beyond(seen.high_far, ez + ew)
+        let outside = beyond(seen.high_near, e_near)
+            | beyond(seen.high_far, e_far)
             | beyond(seen.high_left, ex + ew)
             | beyond(seen.high_right, ex + ew)
             | beyond(seen.high_bottom, ey + ew)
             | beyond(seen.high_top, ey + ew);
         // No vertex before near or behind far, and all before the eye.
         let least_w = seen.low_w - ew;
-        let whole = least_w.simd_gt(zero) & seen.low_z.simd_ge(ez) & seen.low_far.simd_ge(ez + ew);
+        let whole =
+            least_w.simd_gt(zero) & seen.low_near.simd_ge(e_near) & seen.low_far.simd_ge(e_far);
         // A quotient a/w of a vertex differs from the exact one by at most (Ea + |a/w|·Ew) / w, the
         // corner's likewise (both are in the errors); then come at most eight roundings of numbers up
         // to the quotient (reciprocal, product, scaling, and the corner's division), and for columns
@@ -150,18 +161,22 @@ impl Projection {
             x1.simd_lt(0.0) | y1.simd_lt(0.0) | x0.simd_ge(self.last[0]) | y0.simd_ge(self.last[1]);
         let limit = (NARROW_PIXELS - 1) as f32;
         let narrow = (x1 - x0).simd_le(limit) & (y1 - y0).simd_le(limit) & whole;
-        let near = (seen.low_depth - spread(most(seen.low_depth, seen.high_depth), ez) * 2.0).max(zero)
+        let [nearest, farthest] = self.order.range();
+        let near = (seen.low_depth - spread(most(seen.low_depth, seen.high_depth), ez) * 2.0)
+            .max(f32x16::splat(s, nearest))
+            .min(f32x16::splat(s, farthest))
             // Turns −0 into +0.
             + 0.0;
         let all = u64::MAX >> (64 - LANES);
         let narrow = narrow.to_bitmask() & all;
         let outside = (outside.to_bitmask() | narrow & aside.to_bitmask()) & all;
-        places(outside, narrow, [x0, y0, x1, y1], near)
+        places(self.order, outside, narrow, [x0, y0, x1, y1], near)
     }
 }
 
 #[inline(always)]
 fn places<S: Simd>(
+    order: DepthOrder,
     outside: u64,
     narrow: u64,
     [x0, y0, x1, y1]: [f32x16<S>; 4],
@@ -177,7 +192,7 @@ fn places<S: Simd>(
         } else if narrow >> i & 1 == 1 {
             // Between −120 and 16,504: neither outside nor wide.
             let (min, max) = ([x0[i] as i16, y0[i] as i16], [x1[i] as i16, y1[i] as i16]);
-            *place = Place::Narrow { min, max, near: near[i].to_bits() };
+            *place = Place::Narrow { min, max, near: order.key(near[i]) };
         }
     }
     places
@@ -191,10 +206,11 @@ struct Extremes<S: Simd> {
     high_y: f32x16<S>,
     low_depth: f32x16<S>,
     high_depth: f32x16<S>,
-    low_z: f32x16<S>,
-    high_z: f32x16<S>,
+    /// Distances to the near plane, z or w + z.
+    low_near: f32x16<S>,
+    high_near: f32x16<S>,
     low_w: f32x16<S>,
-    /// w − z.
+    /// Distances to the far plane, w − z or −z.
     low_far: f32x16<S>,
     high_far: f32x16<S>,
     /// w + x, w − x, w + y, w − y.
@@ -215,8 +231,8 @@ impl<S: Simd> Extremes<S> {
             high_y: high,
             low_depth: low,
             high_depth: high,
-            low_z: low,
-            high_z: high,
+            low_near: low,
+            high_near: high,
             low_w: low,
             low_far: low,
             high_far: high,
@@ -228,7 +244,7 @@ impl<S: Simd> Extremes<S> {
     }
 
     #[inline(always)]
-    fn add(&mut self, [x, y, z, w]: [f32x16<S>; 4]) {
+    fn add(&mut self, [x, y, z, w]: [f32x16<S>; 4], planes: [f32; 2]) {
         let keep = inlined(
             #[inline(always)]
             |low: &mut f32x16<S>, high: &mut f32x16<S>, value: f32x16<S>| {
@@ -239,8 +255,8 @@ impl<S: Simd> Extremes<S> {
         keep(&mut self.low_x, &mut self.high_x, x / w);
         keep(&mut self.low_y, &mut self.high_y, y / w);
         keep(&mut self.low_depth, &mut self.high_depth, z / w);
-        keep(&mut self.low_z, &mut self.high_z, z);
-        keep(&mut self.low_far, &mut self.high_far, w - z);
+        keep(&mut self.low_near, &mut self.high_near, w * planes[0] + z);
+        keep(&mut self.low_far, &mut self.high_far, w * planes[1] - z);
         self.low_w = self.low_w.min(w);
         self.high_left = self.high_left.max(w + x);
         self.high_right = self.high_right.max(w - x);
@@ -284,14 +300,23 @@ mod tests {
         std::array::from_fn(|i| columns[i / 4][i % 4] as f32)
     }
 
+    /// The same with depth from −1 at the near plane to 0 at the far one.
+    fn reversed(mut m: [f32; 16]) -> [f32; 16] {
+        (0..4).for_each(|column| m[4 * column + 2] -= m[4 * column + 3]);
+        m
+    }
+
     /// Sixteen boxes of a few vertices each, so small that mostly the margins decide, and what the
     /// vertices become.
-    fn round(dice: &mut Dice, far: f32) -> (Batch, Vec<Vec<[f32; 4]>>) {
+    fn round(dice: &mut Dice, far: f32, order: DepthOrder) -> (Batch, Vec<Vec<[f32; 4]>>) {
         let mut batch = Batch::new();
         let mut clips = Vec::new();
         for lane in 0..LANES {
             let eye = [0; 3].map(|_| dice.between(-far, far));
-            let m = matrix(eye);
+            let m = match order {
+                DepthOrder::Forward => matrix(eye),
+                DepthOrder::Reversed => reversed(matrix(eye)),
+            };
             let depth = dice.between(-0.2, 60.0);
             let middle = [
                 eye[0] + dice.between(-1.2, 1.2) * depth,
@@ -316,12 +341,21 @@ mod tests {
 
     #[test]
     fn bounds_hold_all_vertices() {
-        let (window, projection) = (Window::new(VIEWPORT), Projection::new(VIEWPORT));
+        bounds_hold(DepthOrder::Forward);
+    }
+
+    #[test]
+    fn bounds_hold_all_vertices_reversed() {
+        bounds_hold(DepthOrder::Reversed);
+    }
+
+    fn bounds_hold(order: DepthOrder) {
+        let (window, projection) = (Window::new(VIEWPORT, order), Projection::new(VIEWPORT, order));
         let mut dice = Dice(1);
         let (mut narrow, mut outside) = (0, 0);
         for i in 0..40_000 {
             let far = [0.0, 1.0, 100.0, 1e4, 1e6][i % 5];
-            let (batch, clips) = round(&mut dice, far);
+            let (batch, clips) = round(&mut dice, far, order);
             let places = dispatch!(Level::new(), s => projection.clusters(s, &batch));
             for (place, clips) in places.iter().zip(clips) {
                 match *place {
@@ -330,7 +364,11 @@ mod tests {
                         outside += 1;
                         let beyond = clips.iter().fold(0x3f, |all, &clip| {
                             let [x, y, z, w] = clip;
-                            let out = [z, w - z, w + x, w - x, w + y, w - y].map(|d| d < 0.0);
+                            let [near, far] = match order {
+                                DepthOrder::Forward => [z, w - z],
+                                DepthOrder::Reversed => [w + z, -z],
+                            };
+                            let out = [near, far, w + x, w - x, w + y, w - y].map(|d| d < 0.0);
                             all & out
                                 .iter()
                                 .enumerate()
@@ -353,7 +391,7 @@ mod tests {
                                 let (low, high) = (i32::from(min[axis]), i32::from(max[axis]));
                                 assert!((low * 256..(high + 1) * 256).contains(&at), "{far}: {at}");
                             }
-                            assert!(near <= vertex.z.to_bits(), "{far}: nearer than {near:x}");
+                            assert!(near <= order.key(vertex.z), "{far}: nearer than {near:x}");
                         }
                     }
                 }

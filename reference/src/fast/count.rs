@@ -33,13 +33,13 @@ pub fn any(image: &Image, draw: &Draw<'_>) -> bool {
 fn each(image: &Image, draw: &Draw<'_>, mut more: impl FnMut(u64) -> bool) {
     assert_eq!(draw.triangles.len(), draw.ranks.len(), "one rank a triangle");
     let viewport = image.viewport();
-    let window = Window::new(viewport);
+    let window = Window::new(viewport, image.order());
     for (i, triangle) in draw.triangles.iter().enumerate() {
         let corners = triangle.map(|vertex| draw.clip_vertex(vertex));
         let Some(polygon) = window.clipper.clip(corners) else { continue };
         for oriented in window.fan(&polygon, draw.faces) {
             let Some(wide) = Wide::new(oriented, draw.stored_id(i), viewport) else { continue };
-            let near = f32::from_bits(wide.near());
+            let near = wide.near(image.order());
             let low = wide.min.map(|pixel| pixel as u32);
             let end = wide.max.map(|pixel| pixel as u32 + 1);
             for block in image.near_blocks(low, end, near) {
@@ -64,8 +64,9 @@ fn passing(image: &Image, wide: &Wide, [x0, y0, x1, y1]: [usize; 4]) -> u64 {
         let mut e = ends.map(|(a, b)| edge(a, b, center(x0), center(row)));
         for column in x0..x1 {
             if (0..3).all(|i| e[i] >= bias[i]) {
-                let stored = f32::from_bits((image.word_at(column, row) >> 32) as u32);
-                passed += u64::from(depth(e.map(|e| e as f64), z, wide.triangle.area) <= stored);
+                let stored = (image.word_at(column, row) >> 32) as u32;
+                let depth = depth(e.map(|e| e as f64), z, wide.triangle.area);
+                passed += u64::from(image.order().key(depth) <= stored);
             }
             for (e, (a, b)) in e.iter_mut().zip(&ends) {
                 *e += SUBPIXELS * (i64::from(a.y) - i64::from(b.y));

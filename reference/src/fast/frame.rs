@@ -12,6 +12,7 @@ use super::wide::Wide;
 use super::{Instance, Work};
 use crate::draw::{Faces, transform};
 use crate::image::{REGION, Viewport};
+use crate::order::DepthOrder;
 use crate::window::{Oriented, Window, WindowVertex};
 
 /// Neighbouring clusters of one instance.
@@ -25,7 +26,7 @@ pub(crate) struct Unit {
     /// Pixels that hold it; none where `min` is above `max`.
     pub(crate) min: [i16; 2],
     pub(crate) max: [i16; 2],
-    /// Bits of a depth that none of its fragments is nearer than.
+    /// The key of a depth that none of its fragments is nearer than.
     pub(crate) near: u32,
 }
 
@@ -66,13 +67,13 @@ impl<'a> Frame<'a> {
     /// all are wide.
     pub(crate) fn new(
         level: Option<Level>,
-        viewport: Viewport,
+        (viewport, order): (Viewport, DepthOrder),
         instances: &'a [Instance<'a>],
         names: &[(u32, u32)],
         skips: bool,
     ) -> (Self, Work) {
         let project = |names: &[(u32, u32)]| {
-            let mut task = Task::new(viewport, instances);
+            let mut task = Task::new(viewport, order, instances);
             match level {
                 Some(level) => dispatch!(level, s => task.project(s, names)),
                 None => task.all_wide(names),
@@ -108,7 +109,7 @@ impl<'a> Frame<'a> {
         &self.lists[unit.list as usize].wide[range(unit.wide)]
     }
 
-    /// For each region the keys of its units, not sorted: bits of the nearest depth, then the unit.
+    /// For each region the keys of its units, not sorted: the key of the nearest depth, then the unit.
     pub(crate) fn regions(&self, viewport: Viewport) -> Vec<Vec<u64>> {
         let across = (viewport.width as usize).div_ceil(REGION);
         let down = (viewport.height as usize).div_ceil(REGION);
@@ -137,6 +138,7 @@ fn range([from, to]: [u32; 2]) -> Range<usize> {
 struct Task<'a> {
     instances: &'a [Instance<'a>],
     viewport: Viewport,
+    order: DepthOrder,
     window: Window,
     projection: Projection,
     batch: Batch,
@@ -146,12 +148,13 @@ struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    fn new(viewport: Viewport, instances: &'a [Instance<'a>]) -> Self {
+    fn new(viewport: Viewport, order: DepthOrder, instances: &'a [Instance<'a>]) -> Self {
         Self {
             instances,
             viewport,
-            window: Window::new(viewport),
-            projection: Projection::new(viewport),
+            order,
+            window: Window::new(viewport, order),
+            projection: Projection::new(viewport, order),
             batch: Batch::new(),
             units: Vec::new(),
             lists: Lists::default(),
@@ -249,7 +252,7 @@ impl<'a> Task<'a> {
         }
         unit.wide[1] = self.lists.wide.len() as u32;
         for wide in &self.lists.wide[range(unit.wide)] {
-            unit.hold(wide.min, wide.max, wide.near());
+            unit.hold(wide.min, wide.max, wide.near(self.order));
         }
         self.units.push(unit);
     }

@@ -33,7 +33,7 @@
 //! 6. **A triangle whose box holds no sample covers none**, and of the tiny boxes of up to 2 × 2 samples
 //!    all four are tested.
 //! 7. **What is left out is strictly behind.** A fragment's depth is never below its nearest vertex': the
-//!    f64 sum of non-negative terms errs by less than 4·2⁻⁵³ of itself, and rounding to f32 is monotone
+//!    f64 sum of terms of one sign errs by less than 4·2⁻⁵³ of itself, and rounding to f32 is monotone
 //!    with that vertex' depth among its values. A cluster's bound is below all depths of its vertices
 //!    (`bound`), a block's bound below the plane of the triangle by the plane's error and compared with
 //!    the next f32 after the stored depth (`wide`). All are compared with *less*, never *less or equal*,
@@ -194,8 +194,13 @@ fn paint(image: &mut Image, instances: &[Instance<'_>], options: Options, clears
             image.clear();
         }
         let parts = names.chunks(PLAIN_UNITS).map(|names| {
-            let (frame, work) =
-                Frame::new(None, image.viewport(), instances, names, options.skip_hidden);
+            let (frame, work) = Frame::new(
+                None,
+                (image.viewport(), image.order()),
+                instances,
+                names,
+                options.skip_hidden,
+            );
             let draw = |keys: &[u64], region: &mut Region<'_>, room: &mut Room| {
                 region::draw(Plain, &frame, keys, region, room)
             };
@@ -203,8 +208,13 @@ fn paint(image: &mut Image, instances: &[Instance<'_>], options: Options, clears
         });
         return parts.fold(Work::default(), Add::add);
     };
-    let (frame, work) =
-        Frame::new(Some(level), image.viewport(), instances, &names, options.skip_hidden);
+    let (frame, work) = Frame::new(
+        Some(level),
+        (image.viewport(), image.order()),
+        instances,
+        &names,
+        options.skip_hidden,
+    );
     let draw = |keys: &[u64], region: &mut Region<'_>, room: &mut Room| dispatch!(level, s => region::draw(Vectors(s), &frame, keys, region, room));
     work + each_region(image, &frame, clears, draw)
 }

@@ -12,6 +12,7 @@ use super::mesh::{CLUSTER_VERTICES, View};
 use super::{Instance, inlined, lookup};
 use crate::draw::Faces;
 use crate::image::{BLOCK, BLOCKS, REGION, Region};
+use crate::order::{DepthOrder, FARTHEST, MAGNITUDE};
 
 /// Triangles of a full cluster, rounded up to vectors, and one vector more to write beyond the end.
 const SLOTS: usize = 6 * LANES;
@@ -86,7 +87,7 @@ pub(crate) struct Job<'a> {
 /// Draws a cluster whose place is narrow.
 #[inline(always)]
 pub(crate) fn draw<S: Simd>(s: S, job: &Job<'_>, region: &mut Region<'_>, room: &mut Room) {
-    job.transform(s, room);
+    job.transform(s, region.order, room);
     let count = job.triangles;
     lookup::corners(s, &room.snapped, job.view.corners, &mut room.corners);
     // The region's pixels from the cluster's first one.
@@ -116,9 +117,9 @@ pub(crate) fn draw<S: Simd>(s: S, job: &Job<'_>, region: &mut Region<'_>, room: 
 impl Job<'_> {
     /// The written transform and window rule, sixteen vertices at a time.
     #[inline(always)]
-    fn transform<S: Simd>(&self, s: S, room: &mut Room) {
+    fn transform<S: Simd>(&self, s: S, order: DepthOrder, room: &mut Room) {
         let m = &self.instance.clip_from_object;
-        let zero = f32x16::splat(s, 0.0);
+        let [near, far] = order.range();
         let [half_x, half_y] = self.half;
         for at in (0..self.vertices).step_by(LANES) {
             let [x, y, z]: [f32x16<S>; 3] = three!(axis => {
@@ -131,7 +132,7 @@ impl Job<'_> {
             let r = f32x16::splat(s, 1.0) / clip(3);
             let column = (clip(0) * r) * half_x + half_x;
             let row = (clip(1) * r) * -half_y + half_y;
-            let depth = (clip(2) * r).max(zero).min(1.0) + 0.0;
+            let depth = (clip(2) * r).max(near).min(far) + 0.0;
             let snap = inlined(
                 #[inline(always)]
                 |value: f32x16<S>, min: i32| -> i32x16<S> {
@@ -196,7 +197,7 @@ impl Job<'_> {
         let column = set_up.first[0][lane] + right + self.min[0] - region.origin[0];
         let row = set_up.first[1][lane] + down + self.min[1] - region.origin[1];
         let stored = &mut region.words[row as usize * REGION + column as usize];
-        if nearest(z) <= *stored {
+        if nearest(region.order, z) <= *stored {
             let e = three!(i => {
                 set_up.edges[i][lane] + right * set_up.right[i][lane] + down * set_up.down[i][lane]
             });
@@ -204,7 +205,7 @@ impl Job<'_> {
             let [e0, e1, e2] = three!(i => f64::from(e[i]));
             let [z0, z1, z2] = three!(i => f64::from(z[i]));
             let depth = (((e0 * z0 + e1 * z1) + e2 * z2) / area) as f32;
-            let word = i64::from(depth.to_bits()) << 32 | i64::from(self.id(triangle));
+            let word = i64::from(region.order.key(depth)) << 32 | i64::from(self.id(triangle));
             *stored = (*stored).min(word);
         }
     }
@@ -231,7 +232,7 @@ impl Job<'_> {
         let bias = three!(i => set_up.bias[i][lane]);
         let at = three!(i => set_up.edges[i][lane]);
         let area = f64::from(at[0] + at[1] + at[2]);
-        let nearest = i64x8::splat(s, nearest(z));
+        let nearest = i64x8::splat(s, nearest(region.order, z));
         let z = three!(i => f64::from(z[i]));
         let lane32 = i32x8::load_array(s, [0, 1, 2, 3, 4, 5, 6, 7]);
         let lane64 = f64x8::load_array(s, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
@@ -253,7 +254,7 @@ impl Job<'_> {
                 let reached = covered & nearest.simd_le(stored).to_bitmask();
                 if reached != 0 {
                     let e = three!(i => along64[i] + f64::from(e[i]));
-                    let word = depth_words(s, e, z, area, id);
+                    let word = depth_words(s, region.order, e, z, area, id);
                     let lower = mask64x8::from_bitmask(s, reached).select(word.min(stored), stored);
                     lower.store_slice(words);
                 }
@@ -265,9 +266,8 @@ impl Job<'_> {
 
 /// The word that no fragment of a triangle with these depths is below.
 #[inline(always)]
-pub(crate) fn nearest(z: [f32; 3]) -> i64 {
-    // Bits of non-negative floats order like the numbers.
-    let [a, b, c] = three!(i => z[i].to_bits());
+pub(crate) fn nearest(order: DepthOrder, z: [f32; 3]) -> i64 {
+    let [a, b, c] = three!(i => order.key(z[i]));
     i64::from(a.min(b).min(c)) << 32
 }
 
@@ -275,6 +275,7 @@ pub(crate) fn nearest(z: [f32; 3]) -> i64 {
 #[inline(always)]
 pub(crate) fn depth_words<S: Simd>(
     s: S,
+    order: DepthOrder,
     e: [f64x8<S>; 3],
     z: [f64; 3],
     area: f64,
@@ -282,7 +283,11 @@ pub(crate) fn depth_words<S: Simd>(
 ) -> i64x8<S> {
     let depth = ((e[0] * z[0] + e[1] * z[1]) + e[2] * z[2]) / area;
     let bits: u32x16<S> = s.narrow_f64x8(depth, depth).bitcast();
-    u32x16::splat(s, id).zip_low(bits).bitcast()
+    let keys = match order {
+        DepthOrder::Forward => bits,
+        DepthOrder::Reversed => u32x16::splat(s, FARTHEST) - (bits & MAGNITUDE),
+    };
+    u32x16::splat(s, id).zip_low(keys).bitcast()
 }
 
 /// Keeps the triangles whose box holds a sample of the region; how many. Columns and rows at once, as

@@ -74,7 +74,8 @@ impl Painter for Plain {
         [column, row]: [usize; 2],
     ) -> bool {
         let z = wide.triangle.v.map(|v| v.z);
-        let nearest = nearest(z);
+        let order = region.order;
+        let nearest = nearest(order, z);
         let mut any = false;
         for i in 0..BLOCK * BLOCK {
             let [x, y] = [column * BLOCK + i % BLOCK, row * BLOCK + i / BLOCK];
@@ -82,8 +83,8 @@ impl Painter for Plain {
             let stored = &mut region.words[y * REGION + x];
             if edges.iter().all(|edge| edge.at(at) >= 0) && nearest <= *stored {
                 let e = [0, 1, 2].map(|i| edges[i].exact_at(at));
-                let bits = depth(e, z, wide.triangle.area).to_bits();
-                *stored = (*stored).min(i64::from(bits) << 32 | i64::from(wide.id));
+                let key = order.key(depth(e, z, wide.triangle.area));
+                *stored = (*stored).min(i64::from(key) << 32 | i64::from(wide.id));
                 any = true;
             }
         }

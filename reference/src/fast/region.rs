@@ -89,13 +89,13 @@ fn list(frame: &Frame<'_>, unit: &Unit, region: &Region<'_>, items: &mut Vec<u64
     }
     for (i, wide) in frame.wide(unit).iter().enumerate() {
         if meets(wide.min, wide.max) {
-            items.push(u64::from(wide.near()) << 32 | u64::from(WIDE) | i as u64);
+            items.push(u64::from(wide.near(region.order)) << 32 | u64::from(WIDE) | i as u64);
         }
     }
 }
 
 impl Region<'_> {
-    /// Bits of a depth that no sample lies behind.
+    /// The key of a depth that no sample lies behind.
     #[inline(always)]
     fn deepest(&self) -> u32 {
         self.far.iter().copied().fold(0, u32::max)

@@ -6,6 +6,7 @@ use fearless_simd::{Simd, f64x8, i32x8, i64x8, mask64x8};
 use super::narrow::{depth_words, nearest};
 use super::painter::Painter;
 use crate::image::{BLOCK, BLOCKS, REGION, Region, Viewport};
+use crate::order::DepthOrder;
 use crate::window::{Oriented, SUBPIXELS, edge, top_left};
 
 /// A triangle that covers at least the box of a sample.
@@ -50,9 +51,9 @@ impl Wide {
         })
     }
 
-    /// Bits of a depth that no fragment is nearer than.
-    pub(crate) fn near(&self) -> u32 {
-        (nearest(three!(i => self.triangle.v[i].z)) >> 32) as u32
+    /// The key of a depth that no fragment is nearer than.
+    pub(crate) fn near(&self, order: DepthOrder) -> u32 {
+        (nearest(order, three!(i => self.triangle.v[i].z)) >> 32) as u32
     }
 }
 
@@ -130,9 +131,9 @@ impl Plane {
 
     /// Whether every fragment in the block is strictly behind `far`. The exact depth is at least the
     /// bound, so where that is not below the f32 after `far`, neither is any depth rounded to f32.
-    fn hidden(&self, [x, y]: [i64; 2], far: u32) -> bool {
+    fn hidden(&self, order: DepthOrder, [x, y]: [i64; 2], far: u32) -> bool {
         let bound = self.depth + self.right * x as f64 + self.down * y as f64;
-        bound >= f64::from(f32::from_bits(far + 1))
+        bound >= f64::from(order.depth(far + 1))
     }
 }
 
@@ -147,7 +148,7 @@ pub(crate) fn draw<P: Painter>(painter: P, wide: &Wide, region: &mut Region<'_>)
     let (y0, y1) = (block(1, wide.min[1]), block(1, wide.max[1]));
     let edges = three!(i => Edge::new(triangle, i, region.origin));
     let plane = Plane::new(triangle, &edges);
-    let near = wide.near();
+    let near = wide.near(region.order);
     let rise = three!(i => edges[i].rise());
     for row in y0..=y1 {
         for column in x0..=x1 {
@@ -157,7 +158,7 @@ pub(crate) fn draw<P: Painter>(painter: P, wide: &Wide, region: &mut Region<'_>)
                 continue;
             }
             let far = region.far[row * BLOCKS + column];
-            if near > far || plane.hidden(place, far) {
+            if near > far || plane.hidden(region.order, place, far) {
                 continue;
             }
             if painter.block(wide, region, &edges, [column, row]) {
@@ -186,7 +187,7 @@ pub(crate) fn samples<S: Simd>(
     });
     let down = three!(i => edges[i].down as i32);
     let z = three!(i => wide.triangle.v[i].z);
-    let nearest = i64x8::splat(s, nearest(z));
+    let nearest = i64x8::splat(s, nearest(region.order, z));
     let z = three!(i => f64::from(z[i]));
     let area = wide.triangle.area as f64;
     let along = three!(i => lane64 * (SUBPIXELS * edges[i].right) as f64);
@@ -201,7 +202,7 @@ pub(crate) fn samples<S: Simd>(
             if reached != 0 {
                 let at = [place[0], place[1] + line as i64];
                 let e = three!(i => along[i] + edges[i].exact_at(at));
-                let word = depth_words(s, e, z, area, wide.id);
+                let word = depth_words(s, region.order, e, z, area, wide.id);
                 let lower = mask64x8::from_bitmask(s, reached).select(word.min(stored), stored);
                 lower.store_slice(words);
                 any = true;
