@@ -47,7 +47,7 @@ pub struct ImageCheck {
 impl ImageCheck {
     /// Compares one frame.
     pub fn frame(&mut self, record: &FrameRecord<'_>) {
-        let image = self.image.get_or_insert_with(|| Image::new(record.world.scene.viewport));
+        let image = self.image.get_or_insert_with(|| record.world.image());
         render(record.world, record.state, record.drawn, image);
         let all = &record.truth.image;
         if image == all {

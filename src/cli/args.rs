@@ -14,7 +14,7 @@ use crate::oracle::{MIB, MemoryKnobs};
 use crate::part::{Crossing, PartitionKnobs};
 use crate::run::CalibrationKnobs;
 use crate::scene::generate::{CameraMode, Knobs};
-use crate::scene::{Scene, Viewport};
+use crate::scene::{DepthOrder, Scene, Viewport};
 
 /// A test bench for visibility culling: nothing in plain sight may be culled.
 #[derive(Parser)]
@@ -86,6 +86,9 @@ pub(super) struct SceneArgs {
     /// Pixels, WIDTHxHEIGHT (default 1280x1024, or what the scene says).
     #[arg(long, value_parser = viewport)]
     pub(super) viewport: Option<Viewport>,
+    /// Which way depth runs (default forward, or what the scene says).
+    #[arg(long, value_enum)]
+    pub(super) depth: Option<DepthArg>,
     /// A model (.obj, .gltf, .glb, .ply): in the place of the blob in bunnies, or the scene `model` itself.
     #[arg(long, value_name = "FILE")]
     pub(super) mesh: Option<PathBuf>,
@@ -280,6 +283,14 @@ pub(super) enum CameraArg {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum DepthArg {
+    /// From 0 near to 1 far: the lesser is the nearer.
+    Forward,
+    /// From 1 near to 0 far, as devices call it: the greater is the nearer.
+    Reversed,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum PartsArg {
     /// It is split: parts do not overlap, triangles become more.
     Split,
@@ -366,6 +377,10 @@ impl SceneArgs {
             scale: self.scale,
             frames: self.frames,
             viewport: self.viewport,
+            depth: self.depth.map(|depth| match depth {
+                DepthArg::Forward => DepthOrder::Forward,
+                DepthArg::Reversed => DepthOrder::Reversed,
+            }),
             mesh: self.mesh.clone(),
             full_size: self.full_size,
             camera: self.camera.map(|camera| match camera {
@@ -386,6 +401,8 @@ impl SceneArgs {
         };
         add("scale", self.scale.map(|s| s.to_string()));
         add("viewport", self.viewport.map(|v| format!("{}x{}", v.width, v.height)));
+        let depth = |d: DepthArg| if d == DepthArg::Forward { "forward" } else { "reversed" };
+        add("depth", self.depth.map(|d| depth(d).to_owned()));
         add("mesh", self.mesh.as_ref().map(|path| path.display().to_string()));
         let camera = |c: CameraArg| if c == CameraArg::Inside { "inside" } else { "orbit" };
         add("camera", self.camera.map(|c| camera(c).to_owned()));

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use clap::Args;
-use plainsight_reference::{Image, Tolerance};
+use plainsight_reference::Tolerance;
 
 use super::args::{SceneArgs, quoted};
 use super::progress::progress_bar;
@@ -275,7 +275,7 @@ fn pictures(
         .map_err(|source| CliError::Write { path: folder.display().to_string(), source })?;
     let state = FrameState::at(world, moment);
     let truth = Truth::of(world, &state);
-    let mut image = Image::new(world.scene.viewport);
+    let mut image = world.image();
     render(world, &state, drawn, &mut image);
     let top = top_view(world, &state, &Shown { drawn, truth: &truth }, TOP_VIEW_SIDE);
     for (name, picture) in [

@@ -2,8 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use plainsight_reference::Image;
-
 use super::args::{Layer, PictureArgs};
 use super::progress::progress_bar;
 use super::run::{catch_interrupt, one_lane};
@@ -78,7 +76,7 @@ pub(super) fn picture(
         Layer::Parts => part_picture(&world, &truth.image),
         Layer::Depth => depth_picture(&truth.image),
         Layer::Culled => {
-            let mut image = Image::new(world.scene.viewport);
+            let mut image = world.image();
             render(&world, &state, &drawn, &mut image);
             part_picture(&world, &image)
         }

@@ -272,11 +272,21 @@ impl Scenery {
                 let this = self.index.node(node);
                 let tight = this.tight_box.filter(|_| self.knobs.tighten);
                 let aabb = tight.or(this.query_box)?;
-                ClipBox::new(&aabb, &view.clip_from_world, &self.node_error[node.0 as usize])
+                ClipBox::new(
+                    &aabb,
+                    &view.clip_from_world,
+                    &self.node_error[node.0 as usize],
+                    view.depth,
+                )
             }
             Item::Object(object, node) => {
                 let seen = &view.objects[object.0 as usize];
-                ClipBox::new(&self.object_box(object, node), &seen.clip_from_object, &seen.error)
+                ClipBox::new(
+                    &self.object_box(object, node),
+                    &seen.clip_from_object,
+                    &seen.error,
+                    view.depth,
+                )
             }
         })
     }
@@ -399,7 +409,7 @@ impl Scenery {
         out: &mut Vec<Proxy>,
     ) -> bool {
         let seen = &view.objects[object.0 as usize];
-        let clip = ClipBox::new(aabb, &seen.clip_from_object, &seen.error);
+        let clip = ClipBox::new(aabb, &seen.clip_from_object, &seen.error, view.depth);
         match clip.project(view.viewport.width, view.viewport.height) {
             Projection::Nowhere => true,
             Projection::Unbounded => false,
@@ -446,7 +456,8 @@ impl Scenery {
     fn box_proxy(view: &View<'_>, object: ObjectId, aabb: &Aabb) -> Option<Proxy> {
         let seen = &view.objects[object.0 as usize];
         let pixels = (view.viewport.width, view.viewport.height);
-        let grown = math::inflated_box(aabb, &seen.clip_from_object, &seen.error, pixels)?;
+        let grown =
+            math::inflated_box(aabb, &seen.clip_from_object, &seen.error, pixels, view.depth)?;
         Some(Proxy::Box {
             clip_from_box: math::rounded_clip_matrix(&seen.clip_from_object),
             min: grown.min.to_array().map(|c| c as f32),

@@ -5,7 +5,7 @@ use glam::{DMat4, DVec3};
 use crate::index::Move;
 use crate::math::{Aabb, ClipBox, ClipError};
 use crate::part::Partition;
-use crate::scene::{Camera, Viewport};
+use crate::scene::{Camera, DepthOrder, Viewport};
 
 /// One object in one frame.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +29,8 @@ pub struct View<'a> {
     pub view: u32,
     /// Pixels.
     pub viewport: Viewport,
+    /// Which way depth runs.
+    pub depth: DepthOrder,
     /// The camera in the world.
     pub camera: Camera,
     /// Clip from world.
@@ -46,6 +48,6 @@ impl View<'_> {
     #[must_use]
     pub fn object_outside_frustum(&self, object: u32) -> bool {
         let view = &self.objects[object as usize];
-        ClipBox::new(&view.bounds, &self.clip_from_world, &view.error).outside_frustum()
+        ClipBox::new(&view.bounds, &self.clip_from_world, &view.error, self.depth).outside_frustum()
     }
 }

@@ -79,7 +79,7 @@ fn symmetric(view: &View<'_>, shown: &mut Shown, _: &mut Memory) {
     if let Lens::Perspective { shift, .. } = &mut camera.lens {
         *shift = [0.0; 2];
     }
-    shown.under(camera.clip_from_world(view.viewport));
+    shown.under(camera.clip_from_world(view.viewport, view.depth));
 }
 
 fn half_of_half(view: &View<'_>, shown: &mut Shown, _: &mut Memory) {
@@ -87,7 +87,7 @@ fn half_of_half(view: &View<'_>, shown: &mut Shown, _: &mut Memory) {
     if let Lens::Perspective { fov_y, .. } = &mut camera.lens {
         *fov_y *= 0.5;
     }
-    shown.under(camera.clip_from_world(view.viewport));
+    shown.under(camera.clip_from_world(view.viewport, view.depth));
 }
 
 fn first_eye(view: &View<'_>, shown: &mut Shown, memory: &mut Memory) {

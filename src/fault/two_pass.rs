@@ -107,7 +107,8 @@ impl TwoPass {
                 let [low, high] = [aabb.min, aabb.max].map(|c| world.transform_point3(c));
                 let carried = Aabb::new(low, high);
                 let outside =
-                    ClipBox::new(&carried, &view.clip_from_world, &seen.error).outside_frustum();
+                    ClipBox::new(&carried, &view.clip_from_world, &seen.error, view.depth)
+                        .outside_frustum();
                 if carried.is_empty() || outside {
                     return Projection::Nowhere;
                 }
@@ -121,7 +122,8 @@ impl TwoPass {
             }
             _ => {}
         }
-        let found = ClipBox::new(&aabb, clip, &seen.error).project(pixels.width, pixels.height);
+        let found =
+            ClipBox::new(&aabb, clip, &seen.error, view.depth).project(pixels.width, pixels.height);
         match (self.flaw, found) {
             (Some(Flaw::FailsClosed), Projection::Unbounded) => Projection::Nowhere,
             (Some(Flaw::EuclideanNearest), Projection::Within { rectangle, .. }) => {

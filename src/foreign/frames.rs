@@ -8,7 +8,7 @@ use super::VERSION;
 use crate::math::Aabb;
 use crate::part::{ObjectId, PartId};
 use crate::run::{FrameState, World};
-use crate::scene::Lens;
+use crate::scene::{DepthOrder, Lens};
 
 #[derive(Serialize)]
 struct Moved {
@@ -53,6 +53,10 @@ pub fn header_line(world: &World) -> String {
         "frames": world.scene.frames,
         "views": world.views(),
         "viewport": [viewport.width, viewport.height],
+        "depth": match world.scene.depth {
+            DepthOrder::Forward => "forward",
+            DepthOrder::Reversed => "reversed",
+        },
         "parts": (0..partition.part_count()).map(part).collect::<Vec<_>>(),
         "objects": (0..partition.object_count()).map(object).collect::<Vec<_>>(),
     })
@@ -84,6 +88,11 @@ pub fn frame_line(world: &World, state: &FrameState) -> String {
         Lens::Perspective { fov_y, shift } => (Some((fov_y, shift)), None),
         Lens::Orthographic { height } => (None, Some(height)),
     };
+    let mut clip_from_world = state.clip_from_world.to_cols_array();
+    if world.scene.depth == DepthOrder::Reversed {
+        // An engine's z is positive.
+        clip_from_world.iter_mut().skip(2).step_by(4).for_each(|z| *z = 0.0 - *z);
+    }
     json!({
         "frame": frame,
         "view": state.moment.view,
@@ -94,7 +103,7 @@ pub fn frame_line(world: &World, state: &FrameState) -> String {
         "height": height,
         "near": camera.near,
         "far": camera.far,
-        "clip_from_world": state.clip_from_world.to_cols_array(),
+        "clip_from_world": clip_from_world,
         "moved": moved,
     })
     .to_string()

@@ -5,7 +5,7 @@
 //! Lines of JSON, UTF-8, one object each. Numbers are written so that they read back to the same bits; a
 //! number that is not finite is `null`. Matrices are 16 numbers, column after column, for column vectors;
 //! the world is right-handed with y up. Clip space has x to the right, y up, and z from 0 at the near plane
-//! to w at the far plane. Column 0, row 0 of the picture is on top on the left. Readers must ignore fields
+//! to w at the far plane, or from w at the near plane to 0 at the far one where `depth` is reversed. Column 0, row 0 of the picture is on top on the left. Readers must ignore fields
 //! that they do not know; a field that changes its meaning or goes raises the version.
 //!
 //! **Frames**, what `export` writes and a culler reads. The first line:
@@ -16,6 +16,7 @@
 //! | `scene`, `seed` | name; seed of every random stream |
 //! | `frames`, `views` | how many frames there are, and views of each: cameras that are judged by themselves |
 //! | `viewport` | pixels: width, height |
+//! | `depth` | `"forward"`, or `"reversed"` for a buffer whose greater depths are the nearer ones |
 //! | `parts` | every part, by id from 0: `object`, `mesh` and `primitive` (in the glTF file), `triangles`, and `min` and `max`, its tight box in the object's space |
 //! | `objects` | every object, by id from 0: `mesh`, `first_part`, `parts` (how many; their ids follow one another) |
 //!

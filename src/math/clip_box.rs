@@ -19,6 +19,7 @@
 //! [`DEPTH_ROUNDING`] that the contents do not need covers three units of eight.
 
 use glam::{DMat4, DVec4};
+use plainsight_reference::DepthOrder;
 
 use super::{Aabb, ClipError, Margins};
 use crate::math::clip_error::absolute;
@@ -27,8 +28,10 @@ use crate::math::clip_error::absolute;
 /// snapping: 2⁻⁹ pixel in the reference, 2⁻⁵ at most on a device, for which Vulkan asks no fewer than
 /// 4 sub-pixel bits. Together they are under 2⁻⁴; this is twice that.
 pub const RECTANGLE_DILATION_PIXELS: f64 = 0.125;
-/// What z·(1/w) may lose: reciprocal and product, one f32 rounding each of a value in [0, 1], and one
-/// for the final rounding of an interpolated depth, doubled for the order of the bound itself.
+/// What z·(1/w) may lose: reciprocal and product, one f32 rounding each of a value up to 1 in size, and one
+/// for the final rounding of an interpolated depth, doubled for the order of the bound itself. Reversed
+/// depths are mostly far below 1 and rounded that much finer: there it is a share of the nearest depth,
+/// which is the largest in size.
 pub const DEPTH_ROUNDING: f64 = 6.0 * (f32::EPSILON as f64 / 2.0);
 /// Rounding of a corner's own transform in f64: four products and three additions, doubled.
 const CORNER_GAMMA: f64 = 8.0 * (f64::EPSILON / 2.0);
@@ -58,7 +61,7 @@ pub enum Projection {
     /// It reaches the near plane or the smallest w, holds the eye or is not finite: to be taken for
     /// visible.
     Unbounded,
-    /// Within the rectangle and nowhere nearer than the depth, which is in [0, 1].
+    /// Within the rectangle and nowhere nearer than the depth, which lies between the planes.
     Within {
         /// Pixels that can be touched.
         rectangle: PixelRectangle,
@@ -78,9 +81,9 @@ pub enum FrustumPlane {
     Bottom,
     /// y = w.
     Top,
-    /// z = 0.
+    /// z = 0; z = −w where depth is reversed.
     Near,
-    /// z = w.
+    /// z = w; z = 0 where depth is reversed.
     Far,
 }
 
@@ -99,15 +102,17 @@ pub(super) struct WindowCorners {
 pub struct ClipBox {
     corners: [DVec4; 8],
     error: [f64; 4],
+    pub(super) order: DepthOrder,
 }
 
 impl ClipBox {
-    /// Transforms `aabb` by `clip_from_box`. `error` is the bound of what the box contains.
+    /// Transforms `aabb` by `clip_from_box`, whose z is that of the depth order. `error` is the bound of what
+    /// the box contains.
     #[must_use]
-    pub fn new(aabb: &Aabb, clip_from_box: &DMat4, error: &ClipError) -> Self {
+    pub fn new(aabb: &Aabb, clip_from_box: &DMat4, error: &ClipError, order: DepthOrder) -> Self {
         let corners = aabb.corners().map(|corner| *clip_from_box * corner.extend(1.0));
         let own = absolute(clip_from_box) * aabb.max_abs().extend(1.0) * CORNER_GAMMA;
-        Self { corners, error: std::array::from_fn(|i| error.bound[i] + own[i]) }
+        Self { corners, error: std::array::from_fn(|i| error.bound[i] + own[i]), order }
     }
 
     /// Whether the box, moved outward by its error, lies wholly beyond one of the six planes. Any NaN
@@ -129,8 +134,12 @@ impl ClipBox {
             () if beyond(&|c| c.w - c.x, ex + ew) => Some(FrustumPlane::Right),
             () if beyond(&|c| c.w + c.y, ey + ew) => Some(FrustumPlane::Bottom),
             () if beyond(&|c| c.w - c.y, ey + ew) => Some(FrustumPlane::Top),
-            () if beyond(&|c| c.z, ez) => Some(FrustumPlane::Near),
-            () if beyond(&|c| c.w - c.z, ez + ew) => Some(FrustumPlane::Far),
+            () if beyond(&|c| before_near(self.order, c), near_error(self.order, &self.error)) => {
+                Some(FrustumPlane::Near)
+            }
+            () if beyond(&|c| before_far(self.order, c), far_error(self.order, ez, ew)) => {
+                Some(FrustumPlane::Far)
+            }
             () => None,
         }
     }
@@ -139,7 +148,12 @@ impl ClipBox {
     /// estimates of work, never for a verdict. Any NaN makes this false.
     #[must_use]
     pub fn inside_frustum(&self) -> bool {
-        let inside = |c: &DVec4| c.x.abs() <= c.w && c.y.abs() <= c.w && 0.0 <= c.z && c.z <= c.w;
+        let inside = |c: &DVec4| {
+            c.x.abs() <= c.w
+                && c.y.abs() <= c.w
+                && before_near(self.order, c) >= 0.0
+                && before_far(self.order, c) >= 0.0
+        };
         self.corners.iter().all(inside)
     }
 
@@ -172,20 +186,35 @@ impl ClipBox {
             return Projection::Nowhere;
         }
         let [_, _, ez, ew] = self.error;
-        let nearest = self.corners.iter().fold(1.0_f64, |z, c| z.min(c.z / c.w));
-        let depth = floor_f32(nearest - (ez + ew) / window.w_min - margins.depth);
+        let [near, far] = self.order.range();
+        let nearest = self.corners.iter().fold(f64::from(far), |z, c| z.min(c.z / c.w));
+        // How large the depths of contents are, and so what w's error moves them by and roundings cost.
+        let size = match self.order {
+            DepthOrder::Forward => 1.0,
+            DepthOrder::Reversed => -nearest,
+        };
+        let exact = nearest - (ez + size * ew) / window.w_min;
+        let depth = match self.order {
+            DepthOrder::Forward => floor_f32(exact - margins.depth),
+            DepthOrder::Reversed => floor_f32(exact + margins.depth * exact),
+        };
         let rectangle = PixelRectangle { min: [x0, y0], max: [x1, y1] };
-        Projection::Within { rectangle, depth: depth.clamp(0.0, 1.0) }
+        // Adding zero turns −0 into +0.
+        Projection::Within { rectangle, depth: depth.clamp(near, far) + 0.0 }
     }
 
     /// The corners in the window; `None` where the box reaches the near plane or the smallest w, or is not
     /// finite.
     pub(super) fn window(&self, width: u32, height: u32) -> Option<WindowCorners> {
-        let [ex, ey, ez, ew] = self.error;
+        let [ex, ey, _, ew] = self.error;
         let w_min = self.corners.iter().fold(f64::INFINITY, |w, c| w.min(c.w)) - ew;
-        let z_min = self.corners.iter().fold(f64::INFINITY, |z, c| z.min(c.z)) - ez;
+        let before = |c: &DVec4| before_near(self.order, c);
+        let least = self.corners.iter().fold(f64::INFINITY, |least, c| least.min(before(c)));
         // Written so that NaN falls out here: "cannot project" means visible.
-        if !(w_min > 0.0 && z_min > 0.0 && self.corners.iter().all(|c| c.is_finite())) {
+        if !(w_min > 0.0
+            && least - near_error(self.order, &self.error) > 0.0
+            && self.corners.iter().all(|c| c.is_finite()))
+        {
             return None;
         }
         let mut window = WindowCorners { corners: [[0.0; 2]; 8], bound: [0.0; 2], w_min };
@@ -200,6 +229,38 @@ impl ClipBox {
             window.bound[axis] = (e + reach * ew) / w_min * half;
         }
         Some(window)
+    }
+}
+
+/// How far a corner is inside the near plane, in clip units.
+pub(super) fn before_near(order: DepthOrder, corner: &DVec4) -> f64 {
+    match order {
+        DepthOrder::Forward => corner.z,
+        DepthOrder::Reversed => corner.w + corner.z,
+    }
+}
+
+/// How far a corner is inside the far plane, in clip units.
+fn before_far(order: DepthOrder, corner: &DVec4) -> f64 {
+    match order {
+        DepthOrder::Forward => corner.w - corner.z,
+        DepthOrder::Reversed => -corner.z,
+    }
+}
+
+/// What [`before_near`] may be off by.
+pub(super) fn near_error(order: DepthOrder, &[_, _, ez, ew]: &[f64; 4]) -> f64 {
+    match order {
+        DepthOrder::Forward => ez,
+        DepthOrder::Reversed => ez + ew,
+    }
+}
+
+/// What [`before_far`] may be off by.
+fn far_error(order: DepthOrder, ez: f64, ew: f64) -> f64 {
+    match order {
+        DepthOrder::Forward => ez + ew,
+        DepthOrder::Reversed => ez,
     }
 }
 

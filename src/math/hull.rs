@@ -36,6 +36,8 @@
 //!
 //! Its depth is the rectangle's, less [`FLAT_DEPTH_STEP`].
 
+use plainsight_reference::DepthOrder;
+
 use super::clip_box::{ClipBox, PixelRectangle, floor_f32};
 use super::{Margins, RECTANGLE_DILATION_PIXELS};
 
@@ -45,7 +47,8 @@ use super::{Margins, RECTANGLE_DILATION_PIXELS};
 /// arithmetic stay under 2⁻⁹, for viewports of up to 16384 pixels; a device snaps by 2⁻⁵ at most, the
 /// reference not at all, for corners are on its grid. Together they are under 2⁻⁴.
 pub const HULL_DILATION_PIXELS: f64 = RECTANGLE_DILATION_PIXELS + 0.125;
-/// What the depth of a hull stands before the rectangle's: 8 units of 2⁻²⁴.
+/// What the depth of a hull stands before the rectangle's: 8 units of 2⁻²⁴; where depth is reversed, that
+/// share of it.
 ///
 /// Its vertices have one depth z and w = 1. Interpolated as a plane, by differences of depths, that is
 /// z exactly, for the differences are zero. The reference adds e₀z + e₁z + e₂z in f64 and divides by the
@@ -161,7 +164,7 @@ pub enum Outline {
     Within {
         /// The outline, within the rectangle.
         hull: Hull,
-        /// Depth of all of it, in [0, 1].
+        /// Depth of all of it, between the planes.
         depth: f32,
     },
 }
@@ -218,7 +221,13 @@ impl ClipBox {
         if columns.into_iter().all(|x| rows.into_iter().all(|y| hull.holds([x, y]))) {
             return Outline::Rectangle;
         }
-        let depth = floor_f32(f64::from(depth) - margins.flat_depth).max(0.0);
+        let depth = f64::from(depth);
+        let step = match self.order {
+            DepthOrder::Forward => margins.flat_depth,
+            DepthOrder::Reversed => margins.flat_depth * -depth,
+        };
+        // Adding zero turns −0 into +0.
+        let depth = floor_f32(depth - step).max(self.order.range()[0]) + 0.0;
         Outline::Within { hull, depth }
     }
 }

@@ -18,11 +18,14 @@
 //! reference, which interpolates exactly.
 
 use glam::{DMat4, DVec3, DVec4};
+use plainsight_reference::DepthOrder;
 
+use super::clip_box::{before_near, near_error};
 use super::clip_error::absolute;
 use super::{Aabb, ClipError, Margins};
 
-/// Depth by which the faces of a box proxy stand before its contents: 64 ulps of a depth near 1, for
+/// Depth by which the faces of a box proxy stand before its contents: 64 ulps of a depth near 1 (where depth
+/// is reversed, of the box's nearest depth), for
 /// a device that evaluates a plane in f32 (three roundings of terms that stay below the viewport's
 /// size times the slope). It holds for faces that are not nearly edge-on; that is why the rectangle,
 /// which has no slope, is the default.
@@ -45,8 +48,9 @@ pub fn inflated_box(
     clip_from_box: &DMat4,
     error: &ClipError,
     viewport: (u32, u32),
+    order: DepthOrder,
 ) -> Option<Aabb> {
-    inflated_box_with(aabb, clip_from_box, error, viewport, &Margins::PROVEN)
+    inflated_box_with(aabb, clip_from_box, error, (viewport, order), &Margins::PROVEN)
 }
 
 /// The same with other margins than the proven ones.
@@ -55,17 +59,22 @@ pub fn inflated_box_with(
     aabb: &Aabb,
     clip_from_box: &DMat4,
     error: &ClipError,
-    (width, height): (u32, u32),
+    ((width, height), order): ((u32, u32), DepthOrder),
     margins: &Margins,
 ) -> Option<Aabb> {
     let corners = aabb.corners().map(|corner| *clip_from_box * corner.extend(1.0));
     let w_max = corners.iter().fold(0.0_f64, |w, c| w.max(c.w));
+    // Depth times w, at most.
+    let deepest = match order {
+        DepthOrder::Forward => w_max,
+        DepthOrder::Reversed => corners.iter().fold(0.0_f64, |z, c| z.max(c.z.abs())),
+    };
     let pixel = |pixels: u32| 2.0 * margins.box_pixels / f64::from(pixels) * w_max;
     let own = error.bound.map(|bound| 2.0 * bound);
     let moved = DVec4::new(
         own[0] + own[3] + pixel(width),
         own[1] + own[3] + pixel(height),
-        own[2] + own[3] + margins.box_depth * w_max,
+        own[2] + own[3] + margins.box_depth * deepest,
         own[3],
     );
     let shift = absolute(&clip_from_box.inverse()) * moved * INVERSE_SLACK;
@@ -81,7 +90,7 @@ pub fn inflated_box_with(
     );
     let clear = |corner: DVec3| {
         let clip = *clip_from_box * corner.extend(1.0);
-        clip.z > moved.z && clip.w > moved.w
+        before_near(order, &clip) > near_error(order, &moved.to_array()) && clip.w > moved.w
     };
     outward.corners().into_iter().all(clear).then_some(outward)
 }

@@ -38,7 +38,7 @@ fn farther(a: f32, b: f32) -> f32 {
 }
 
 fn farthest(depths: &[f32]) -> f32 {
-    depths.iter().copied().fold(0.0, farther)
+    depths.iter().copied().fold(f32::NEG_INFINITY, farther)
 }
 
 impl DepthMaxima {

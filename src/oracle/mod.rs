@@ -28,7 +28,7 @@ use plainsight_reference::fast::Options;
 
 use crate::math::{HULL_SUBPIXELS, Hull};
 use crate::part::{PartId, Partition};
-use crate::scene::Viewport;
+use crate::scene::{DepthOrder, Viewport};
 
 pub use always::Always;
 pub use cost::{Amounts, CostModel};
@@ -118,7 +118,7 @@ pub struct Answer {
 /// Images that a device gave back. Row 0 is on top; `width × height` entries each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadBack {
-    /// Depth, 1.0 where nothing was drawn.
+    /// Depth, that of the far plane where nothing was drawn.
     pub depth: Vec<f32>,
     /// Part id plus one, 0 where nothing was drawn. `None` where only depth was asked for.
     pub parts: Option<Vec<u32>>,
@@ -131,6 +131,8 @@ pub struct Stage {
     pub partition: Arc<Partition>,
     /// Pixels.
     pub viewport: Viewport,
+    /// Which way depth runs.
+    pub depth: DepthOrder,
     /// How an oracle that is a reference renderer draws; no answer depends on it.
     pub render: Options,
     /// The memory that each oracle's device has for meshes; `None` holds all of them.
@@ -138,10 +140,16 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Drawn in the default way, with memory for everything.
+    /// Drawn in the default way, depth forward, with memory for everything.
     #[must_use]
     pub fn new(partition: Arc<Partition>, viewport: Viewport) -> Self {
-        Self { partition, viewport, render: Options::default(), memory: None }
+        Self {
+            partition,
+            viewport,
+            depth: DepthOrder::Forward,
+            render: Options::default(),
+            memory: None,
+        }
     }
 }
 

@@ -65,7 +65,7 @@ impl Sim {
     /// Where the stage has not enough memory for its largest mesh.
     #[must_use]
     pub fn new(stage: Stage) -> Self {
-        let image = Image::new(stage.viewport);
+        let image = Image::ordered(stage.viewport, stage.depth);
         let residency = stage.memory.map(|knobs| Residency::new(&stage.partition, knobs));
         Self {
             stage,

@@ -27,13 +27,15 @@ pub struct Shown<'a> {
 /// distance from the far plane is shown, stretched over what the image holds.
 #[must_use]
 pub fn depth_picture(image: &Image) -> RgbImage {
-    let shade = |depth: f32| libm::sqrt(libm::sqrt(1.0 - f64::from(depth)));
-    let drawn = || image.depths().filter(|&depth| depth < 1.0).map(shade);
+    let [_, far] = image.order().range();
+    // 1 at the near plane in either order, and about near over distance.
+    let shade = |depth: f32| libm::sqrt(libm::sqrt(f64::from(far) - f64::from(depth)));
+    let drawn = || image.depths().filter(|&depth| depth < far).map(shade);
     let (low, high) = drawn().fold((f64::INFINITY, 0.0_f64), |(l, h), s| (l.min(s), h.max(s)));
     let span = if high > low { high - low } else { 1.0 };
     paint(image, |sample| {
         let depth = image.depth(sample);
-        if depth >= 1.0 {
+        if depth >= far {
             return [0; 3];
         }
         [(40.0 + 215.0 * (shade(depth) - low) / span) as u8; 3]

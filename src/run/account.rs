@@ -256,7 +256,7 @@ fn made(
 /// Objects that are drawn with their node are tested by their boxes in the world.
 fn beyond_by_world_box(view: &View<'_>, object: ObjectId) -> Option<FrustumPlane> {
     let seen = &view.objects[object.0 as usize];
-    ClipBox::new(&seen.bounds, &view.clip_from_world, &seen.error).beyond()
+    ClipBox::new(&seen.bounds, &view.clip_from_world, &seen.error, view.depth).beyond()
 }
 
 fn conclude(
@@ -267,7 +267,7 @@ fn conclude(
     steps: Vec<Step>,
 ) -> Account {
     let truth = Truth::of(world, &state);
-    let mut alone = Image::new(world.scene.viewport);
+    let mut alone = world.image();
     render(world, &state, &[part], &mut alone);
     let width = world.scene.viewport.width;
     let place = |sample: usize| [sample as u32 % width, sample as u32 / width];

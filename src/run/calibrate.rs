@@ -20,7 +20,7 @@ use crate::oracle::{
     Always, Answer, CostModel, FrameView, Measurement, Oracle, OracleError, Proxy,
 };
 use crate::part::PartId;
-use crate::scene::{Stream, Viewport};
+use crate::scene::{Scene, Stream};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,7 +121,7 @@ pub fn workloads(world: &World, stream: &str, count: u32) -> Vec<Workload> {
     let make = |&kind: &Kind| {
         let (frame, parts) = &views[stream.below(views.len() as u32) as usize];
         let parts = subset(&mut stream, kind, world, parts);
-        let questions = questions(&mut stream, kind, world.scene.viewport);
+        let questions = questions(&mut stream, kind, &world.scene);
         Workload { frame: *frame, steps: steps(&mut stream, parts, questions) }
     };
     kinds.map(make).collect()
@@ -186,7 +186,7 @@ fn subset(stream: &mut Stream, kind: Kind, world: &World, parts: &[PartId]) -> V
 }
 
 /// The questions of each round trip; a trip has at least one, as no culler waits for nothing.
-fn questions(stream: &mut Stream, kind: Kind, viewport: Viewport) -> Vec<Vec<Vec<Proxy>>> {
+fn questions(stream: &mut Stream, kind: Kind, scene: &Scene) -> Vec<Vec<Vec<Proxy>>> {
     let mut up_to = |most: f64| scattered(stream, 1.0, most) as usize;
     let (count, trips) = match kind {
         Kind::Nothing | Kind::Parts => return Vec::new(),
@@ -196,12 +196,13 @@ fn questions(stream: &mut Stream, kind: Kind, viewport: Viewport) -> Vec<Vec<Vec
     };
     let most = if stream.below(2) == 0 { 1 } else { MOST_PROXIES };
     let proxies: Vec<u32> = (0..count.max(trips)).map(|_| 1 + stream.below(most)).collect();
+    let viewport = scene.viewport;
     let viewports = MOST_VIEWPORTS * f64::from(viewport.width) * f64::from(viewport.height);
     let pixels = scattered(stream, LEAST_PIXELS, viewports.max(LEAST_PIXELS));
     let each = pixels / f64::from(proxies.iter().sum::<u32>());
     let mut asked = vec![Vec::new(); trips];
     for (number, count) in proxies.into_iter().enumerate() {
-        let question = (0..count).map(|_| rectangle(stream, each, viewport)).collect();
+        let question = (0..count).map(|_| rectangle(stream, each, scene)).collect();
         let trip = if number < trips { number } else { stream.below(trips as u32) as usize };
         asked[trip].push(question);
     }
@@ -209,7 +210,8 @@ fn questions(stream: &mut Stream, kind: Kind, viewport: Viewport) -> Vec<Vec<Vec
 }
 
 /// A rectangle of about so many samples, at least one, somewhere in the viewport.
-fn rectangle(stream: &mut Stream, pixels: f64, viewport: Viewport) -> Proxy {
+fn rectangle(stream: &mut Stream, pixels: f64, scene: &Scene) -> Proxy {
+    let (viewport, [_, far]) = (scene.viewport, scene.depth.range());
     let pixels = pixels * stream.range(0.5, 1.5);
     let aspect = scattered(stream, 1.0 / MOST_ASPECT, MOST_ASPECT);
     let mut span = |side: f64, most: u32| {
@@ -221,7 +223,7 @@ fn rectangle(stream: &mut Stream, pixels: f64, viewport: Viewport) -> Proxy {
         span((pixels * aspect).sqrt(), viewport.width),
         span((pixels / aspect).sqrt(), viewport.height),
     );
-    let depth = (1.0 - DEPTH_RANGE * stream.unit() * stream.unit()) as f32;
+    let depth = (f64::from(far) - DEPTH_RANGE * stream.unit() * stream.unit()) as f32;
     Proxy::Rectangle { min: [x.0, y.0], max: [x.1, y.1], depth }
 }
 

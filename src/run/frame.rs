@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DMat4, DVec3};
+use plainsight_reference::Image;
 use plainsight_reference::fast::Options;
 
 use super::Moment;
@@ -104,11 +105,18 @@ impl World {
         self.effects.placement(object.0, t).world_from_object()
     }
 
+    /// A cleared image of the scene's size and depth order.
+    #[must_use]
+    pub fn image(&self) -> Image {
+        Image::ordered(self.scene.viewport, self.scene.depth)
+    }
+
     /// What its oracles work on.
     #[must_use]
     pub fn stage(&self) -> Stage {
-        let (partition, viewport) = (self.partition.clone(), self.scene.viewport);
-        Stage { partition, viewport, render: self.render, memory: self.memory }
+        let partition = self.partition.clone();
+        let (viewport, depth) = (self.scene.viewport, self.scene.depth);
+        Stage { partition, viewport, depth, render: self.render, memory: self.memory }
     }
 
     /// What an index is built from: the boxes of frame 0.
@@ -150,7 +158,7 @@ impl FrameState {
     pub fn at(world: &World, moment: Moment) -> Self {
         let t = moment.frame;
         let camera = world.scene.cameras[moment.view as usize].at(t);
-        let clip_from_world = camera.clip_from_world(world.scene.viewport);
+        let clip_from_world = camera.clip_from_world(world.scene.viewport, world.scene.depth);
         let objects: Vec<ObjectView> = (0..world.scene.objects.len() as u32)
             .map(|object| {
                 let world_from_object = world.world_from_object(ObjectId(object), t);
@@ -192,6 +200,7 @@ impl FrameState {
             frame: self.moment.frame,
             view: self.moment.view,
             viewport: world.scene.viewport,
+            depth: world.scene.depth,
             camera: self.camera,
             clip_from_world: self.clip_from_world,
             objects: &self.objects,

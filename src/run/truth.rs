@@ -25,7 +25,7 @@ impl Truth {
     /// Renders every part of the frame.
     #[must_use]
     pub fn of(world: &World, state: &FrameState) -> Self {
-        let mut image = Image::new(world.scene.viewport);
+        let mut image = world.image();
         let all: Vec<PartId> = (0..world.partition.part_count()).map(PartId).collect();
         render(world, state, &all, &mut image);
         let mut visible_pixels = vec![0_u32; all.len()];
@@ -67,7 +67,7 @@ pub fn fates_of_parts(world: &World, state: &FrameState, tolerance: Tolerance) -
     let parts = (0..world.partition.part_count()).map(PartId);
     let draws: Vec<Draw<'_>> =
         parts.map(|part| part_draw(&world.partition, part, &state.matrices)).collect();
-    fates(world.scene.viewport, &draws, tolerance)
+    fates(world.scene.viewport, world.scene.depth, &draws, tolerance)
 }
 
 /// How many triangles cover a sample on average, over the samples that any covers: all of them, near
@@ -75,7 +75,7 @@ pub fn fates_of_parts(world: &World, state: &FrameState, tolerance: Tolerance) -
 #[must_use]
 pub fn depth_complexity(world: &World, state: &FrameState) -> f64 {
     use rayon::prelude::*;
-    let mut image = Image::new(world.scene.viewport);
+    let mut image = world.image();
     let parts = 0..world.partition.part_count();
     // Against an empty image every covered sample passes.
     let count = |part| {

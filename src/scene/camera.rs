@@ -2,7 +2,7 @@
 
 use glam::{DMat4, DVec3, DVec4};
 
-use super::Viewport;
+use super::{DepthOrder, Viewport};
 use crate::math;
 
 /// How a camera turns directions into places in the picture.
@@ -58,10 +58,11 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Clip from world in f64: x right, y up, z from 0 at the near plane to w at the far plane.
+    /// Clip from world in f64: x right, y up, z from 0 at the near plane to w at the far plane, or from
+    /// −w to 0 where depth is reversed: an engine's z there, its sign turned ([`DepthOrder::Reversed`]).
     /// World y is up; where `forward` is parallel to it, world z is taken instead.
     #[must_use]
-    pub fn clip_from_world(&self, viewport: Viewport) -> DMat4 {
+    pub fn clip_from_world(&self, viewport: Viewport, depth: DepthOrder) -> DMat4 {
         let f = self.forward;
         let up = if f.x == 0.0 && f.z == 0.0 { DVec3::Z } else { DVec3::Y };
         let right = f.cross(up).normalize();
@@ -72,32 +73,49 @@ impl Camera {
             DVec4::new(right.z, up.z, -f.z, 0.0),
             DVec4::new(-right.dot(self.eye), -up.dot(self.eye), f.dot(self.eye), 1.0),
         );
-        self.projection(viewport) * view
+        self.projection(viewport, depth) * view
     }
 
     /// Clip from view space, whose z goes backwards.
-    fn projection(&self, viewport: Viewport) -> DMat4 {
+    fn projection(&self, viewport: Viewport, depth: DepthOrder) -> DMat4 {
         let aspect = f64::from(viewport.height) / f64::from(viewport.width);
         match self.lens {
             Lens::Perspective { fov_y, shift } => {
                 let scale_y = 1.0 / math::tan(fov_y * 0.5);
-                // far / (near − far), which goes to −1.
-                let depth =
-                    if self.far.is_finite() { self.far / (self.near - self.far) } else { -1.0 };
+                // z is slope·z_view + offset. Forward: far / (near − far), which goes to −1, and near
+                // times that. Reversed, less w: near / (near − far), which goes to 0, and far times that,
+                // which goes to −near.
+                let (slope, offset) = match (depth, self.far.is_finite()) {
+                    (DepthOrder::Forward, true) => {
+                        let slope = self.far / (self.near - self.far);
+                        (slope, slope * self.near)
+                    }
+                    (DepthOrder::Forward, false) => (-1.0, -self.near),
+                    (DepthOrder::Reversed, true) => {
+                        let slope = self.near / (self.near - self.far);
+                        (slope, slope * self.far)
+                    }
+                    (DepthOrder::Reversed, false) => (0.0, -self.near),
+                };
                 DMat4::from_cols(
                     DVec4::new(scale_y * aspect, 0.0, 0.0, 0.0),
                     DVec4::new(0.0, scale_y, 0.0, 0.0),
-                    DVec4::new(shift[0], shift[1], depth, -1.0),
-                    DVec4::new(0.0, 0.0, depth * self.near, 0.0),
+                    DVec4::new(shift[0], shift[1], slope, -1.0),
+                    DVec4::new(0.0, 0.0, offset, 0.0),
                 )
             }
             Lens::Orthographic { height } => {
-                let (scale_y, depth) = (2.0 / height, 1.0 / (self.near - self.far));
+                let (scale_y, slope) = (2.0 / height, 1.0 / (self.near - self.far));
+                // Where z is 0.
+                let at = match depth {
+                    DepthOrder::Forward => self.near,
+                    DepthOrder::Reversed => self.far,
+                };
                 DMat4::from_cols(
                     DVec4::new(scale_y * aspect, 0.0, 0.0, 0.0),
                     DVec4::new(0.0, scale_y, 0.0, 0.0),
-                    DVec4::new(0.0, 0.0, depth, 0.0),
-                    DVec4::new(0.0, 0.0, depth * self.near, 1.0),
+                    DVec4::new(0.0, 0.0, slope, 0.0),
+                    DVec4::new(0.0, 0.0, slope * at, 1.0),
                 )
             }
         }

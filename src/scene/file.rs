@@ -8,6 +8,7 @@
 //! scale = 0.5
 //! frames = 10
 //! viewport = [640, 480]
+//! depth = "reversed"                        # or "forward", the default
 //! ```
 //!
 //! ```toml
@@ -44,8 +45,8 @@ use serde::Deserialize;
 
 use super::generate::{self, CameraMode, Knobs};
 use super::{
-    CameraPath, CameraPose, Effects, Jumps, Lens, Mesh, Motion, Object, Path as Way, Placement,
-    Scene, SceneError, Teleport, Travel, Viewport,
+    CameraPath, CameraPose, DepthOrder, Effects, Jumps, Lens, Mesh, Motion, Object, Path as Way,
+    Placement, Scene, SceneError, Teleport, Travel, Viewport,
 };
 
 /// The only version there is.
@@ -63,6 +64,7 @@ struct SceneFile {
     full_size: bool,
     frames: Option<u32>,
     viewport: Option<[u32; 2]>,
+    depth: Option<DepthName>,
     leaf_triangles: Option<u32>,
     mesh: Option<PathBuf>,
     camera: Option<CameraName>,
@@ -71,6 +73,13 @@ struct SceneFile {
     camera_path: Option<InlinePath>,
     #[serde(default)]
     views: Vec<InlinePath>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum DepthName {
+    Forward,
+    Reversed,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -171,6 +180,10 @@ pub fn parse(text: &str, path: &Path, knobs: &Knobs) -> Result<Scene, SceneError
         CameraName::Inside => CameraMode::Inside,
         CameraName::Orbit => CameraMode::Orbit,
     });
+    let depth = file.depth.map(|depth| match depth {
+        DepthName::Forward => DepthOrder::Forward,
+        DepthName::Reversed => DepthOrder::Reversed,
+    });
     let viewport = file.viewport.map(|[width, height]| Viewport { width, height });
     let merged = Knobs {
         seed: knobs.seed.or(file.seed),
@@ -178,6 +191,7 @@ pub fn parse(text: &str, path: &Path, knobs: &Knobs) -> Result<Scene, SceneError
         full_size: knobs.full_size || file.full_size,
         frames: knobs.frames.or(file.frames),
         viewport: knobs.viewport.or(viewport),
+        depth: knobs.depth.or(depth),
         mesh: knobs.mesh.clone().or_else(|| file.mesh.as_ref().map(|mesh| folder.join(mesh))),
         camera: knobs.camera.or(camera),
     };
@@ -257,6 +271,7 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
         objects,
         cameras,
         viewport: chosen.viewport,
+        depth: chosen.depth,
         leaf_triangles: file.leaf_triangles.unwrap_or(chosen.leaf_triangles),
         frames: chosen.frames,
         effects: Effects {

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
-pub use plainsight_reference::Viewport;
+pub use plainsight_reference::{DepthOrder, Viewport};
 
 pub use camera::{Camera, CameraPath, CameraPose, Lens, Travel};
 pub use stream::Stream;
@@ -203,6 +203,8 @@ pub struct Scene {
     pub cameras: Vec<CameraPath>,
     /// Pixels.
     pub viewport: Viewport,
+    /// Which way depth runs.
+    pub depth: DepthOrder,
     /// How many frames a run has by default.
     pub frames: u32,
     /// Most triangles in a part where the user says nothing; at least 1.

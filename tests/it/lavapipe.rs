@@ -16,7 +16,7 @@ use plainsight::oracle::{FrameView, Oracle, Stage, part_draw};
 use plainsight::part::{PartId, Partition, PartitionKnobs};
 use plainsight::run::{FrameState, Truth};
 use plainsight::scene::generate::{Knobs, build};
-use plainsight::scene::{Camera, Lens, Mesh, Object, Placement, Stream, Viewport};
+use plainsight::scene::{Camera, DepthOrder, Lens, Mesh, Object, Placement, Stream, Viewport};
 use plainsight_reference::{Image, naive};
 
 use crate::common::{gpu, world};
@@ -29,7 +29,7 @@ const VIEWPORT: Viewport = Viewport { width: 97, height: 71 };
 fn clip_from_view() -> DMat4 {
     let (eye, forward) = (DVec3::ZERO, DVec3::NEG_Z);
     Camera { eye, forward, lens: Lens::perspective(1.2), near: 1.0, far: 20.0 }
-        .clip_from_world(VIEWPORT)
+        .clip_from_world(VIEWPORT, DepthOrder::Forward)
 }
 
 /// Which planes the corners are beyond; `None` for a triangle that crosses two kinds, or nothing.

@@ -3,24 +3,27 @@
 
 use glam::{DMat4, DVec3, DVec4};
 use plainsight::math::{
-    Aabb, CLIP_ERROR_GAMMA, ClipBox, ClipError, DEPTH_ROUNDING, FLAT_DEPTH_STEP,
+    Aabb, CLIP_ERROR_GAMMA, ClipBox, ClipError, DEPTH_ROUNDING, FLAT_DEPTH_STEP, FrustumPlane,
     HULL_DILATION_PIXELS, Hull, MOST_HULL_CORNERS, Margins, Outline, Projection,
     RECTANGLE_DILATION_PIXELS, inflated_box, rounded_clip_matrix,
 };
-use plainsight::scene::{Camera, Lens, Stream, Viewport};
+use plainsight::scene::{Camera, DepthOrder, Lens, Stream, Viewport};
 use plainsight_reference::{Draw, Faces, Image, naive};
 
 const VIEWPORT: Viewport = Viewport { width: 201, height: 133 };
 
-fn camera(near: f64, far: f64) -> DMat4 {
+const ORDERS: [DepthOrder; 2] = [DepthOrder::Forward, DepthOrder::Reversed];
+
+fn camera(near: f64, far: f64, order: DepthOrder) -> DMat4 {
     let (eye, forward) = (DVec3::ZERO, DVec3::NEG_Z);
-    Camera { eye, forward, lens: Lens::perspective(1.0), near, far }.clip_from_world(VIEWPORT)
+    let camera = Camera { eye, forward, lens: Lens::perspective(1.0), near, far };
+    camera.clip_from_world(VIEWPORT, order)
 }
 
 /// Clip coordinates (x, y, z, w) = (x, y, z, 1): boxes can be put where a test wants them.
 fn plain(min: [f64; 3], max: [f64; 3]) -> ClipBox {
     let aabb = Aabb::new(DVec3::from_array(min), DVec3::from_array(max));
-    ClipBox::new(&aabb, &DMat4::IDENTITY, &ClipError::ZERO)
+    ClipBox::new(&aabb, &DMat4::IDENTITY, &ClipError::ZERO, DepthOrder::Forward)
 }
 
 #[test]
@@ -31,7 +34,7 @@ fn the_frustum_is_closed_up_to_the_error() {
     error.bound = [1e-6, 0.0, 0.0, 1e-6];
     let with = |x: f64| {
         let aabb = Aabb::new(DVec3::new(x, 0.0, 0.5), DVec3::new(x + 0.1, 0.1, 0.6));
-        ClipBox::new(&aabb, &DMat4::IDENTITY, &error).outside_frustum()
+        ClipBox::new(&aabb, &DMat4::IDENTITY, &error, DepthOrder::Forward).outside_frustum()
     };
     assert!(with(1.0 + 2.1e-6) && !with(1.0 + 1.9e-6));
     let nan = plain([f64::NAN; 3], [f64::NAN; 3]);
@@ -45,6 +48,57 @@ fn the_near_plane_makes_visible() {
     assert_eq!(nearest(0.0), Projection::Unbounded);
     assert_eq!(nearest(-1e-9), Projection::Unbounded);
     assert!(matches!(nearest(1e-3), Projection::Within { .. }));
+}
+
+/// Reversed: from −1 at the near plane to 0, a margin that is a share of the depth, and the same planes.
+#[test]
+fn reversed_depth_has_its_planes_and_margins() {
+    let error = ClipError { bound: [0.0, 0.0, 1e-6, 2e-6] };
+    let boxed = |near: f64, far: f64, error: &ClipError| {
+        let aabb = Aabb::new(DVec3::new(0.005, 0.005, near), DVec3::new(0.495, 0.495, far));
+        ClipBox::new(&aabb, &DMat4::IDENTITY, error, DepthOrder::Reversed)
+    };
+    let beyond = |near: f64, far: f64| boxed(near, far, &error).beyond();
+    assert_eq!(beyond(-1.2, -1.0 - 3.1e-6), Some(FrustumPlane::Near), "over both errors");
+    assert_eq!(beyond(-1.2, -1.0 - 2.9e-6), None, "under them");
+    assert_eq!(beyond(1.1e-6, 0.2), Some(FrustumPlane::Far), "w takes no part");
+    assert_eq!(beyond(0.9e-6, 0.2), None);
+    let project = |near: f64| boxed(near, -1e-9, &ClipError::ZERO).project(100, 100);
+    assert_eq!(project(-1.0), Projection::Unbounded, "on the near plane");
+    for nearest in [-1.0 + 1e-3, -0.5, -1e-4, -1e-8] {
+        let Projection::Within { depth, .. } = project(nearest) else { panic!("{nearest}") };
+        let margin = nearest - f64::from(depth);
+        assert!(margin >= DEPTH_ROUNDING * -nearest, "{nearest}: {depth}");
+        assert!(margin < 2.0 * DEPTH_ROUNDING * -nearest, "{nearest}: {depth}");
+    }
+    let outside = boxed(-0.5, -0.1, &ClipError::ZERO);
+    assert!(outside.inside_frustum() && !boxed(-0.5, 0.1, &ClipError::ZERO).inside_frustum());
+}
+
+/// Both orders see the same frustum, and reversed depth is forward depth less one, up to f64's rounding.
+#[test]
+fn a_camera_has_one_frustum_in_both_orders() {
+    for (near, far) in [(0.1, 100.0), (0.5, 2.0), (0.1, f64::INFINITY)] {
+        for lens in [
+            Lens::Perspective { fov_y: 1.0, shift: [0.3, -0.2] },
+            Lens::Orthographic { height: 3.0 },
+        ] {
+            if !far.is_finite() && matches!(lens, Lens::Orthographic { .. }) {
+                continue;
+            }
+            let camera = Camera { eye: DVec3::ONE, forward: DVec3::NEG_Z, lens, near, far };
+            let [a, b] = ORDERS.map(|order| camera.clip_from_world(VIEWPORT, order));
+            let at = |distance: f64| DVec4::new(1.2, 0.9, 1.0 - distance, 1.0);
+            for distance in [near, 2.0 * near, far.min(1e6)] {
+                let (a, b) = (a * at(distance), b * at(distance));
+                assert_eq!((a.x, a.y, a.w), (b.x, b.y, b.w));
+                assert!((a.z - a.w - b.z).abs() <= 1e-12 * a.w, "{distance}: {a} {b}");
+            }
+            let [first, last] = [near, far.min(1e300)].map(|d| b * at(d));
+            assert!((first.z / first.w + 1.0).abs() < 1e-12, "{first}");
+            assert!((last.z / last.w).abs() < 1e-12, "{last}");
+        }
+    }
 }
 
 #[test]
@@ -109,7 +163,8 @@ fn edges_beside_sample_places_stay_inside() {
             faces: Faces::Both,
         };
         naive::draw(&mut image, &draw);
-        let seen = ClipBox::new(&bounds, &DMat4::IDENTITY, &error).project(side, side);
+        let seen = ClipBox::new(&bounds, &DMat4::IDENTITY, &error, DepthOrder::Forward)
+            .project(side, side);
         for sample in (0..image.sample_count()).filter(|&s| image.draw_index(s).is_some()) {
             let at = [sample as u32 % side, sample as u32 / side];
             let Projection::Within { rectangle: r, .. } = seen else { panic!("round {round}") };
@@ -130,7 +185,8 @@ fn the_clip_error_bounds_what_f32_does() {
         let place = DVec3::new(stream.range(-1.0, 1.0), stream.range(-1.0, 1.0), -3.0) * far_out;
         let world = DMat4::from_translation(place)
             * DMat4::from_scale(DVec3::splat(stream.range(0.1, 9.0)));
-        let clip = camera(0.1 * far_out, 100.0 * far_out);
+        let order = ORDERS[stream.below(2) as usize];
+        let clip = camera(0.1 * far_out, 100.0 * far_out, order);
         let reach = DVec3::splat(stream.range(0.0, 2.0));
         let p = [reach.x as f32, -reach.y as f32, reach.z as f32];
         let exact = clip * world * DVec3::from_array(p.map(f64::from)).extend(1.0);
@@ -165,7 +221,8 @@ fn proxies_cover_their_contents() {
         let world = DMat4::from_translation(place * far_out)
             * DMat4::from_rotation_y(stream.range(-3.0, 3.0))
             * DMat4::from_scale(DVec3::splat(far_out * stream.range(0.01, 1.0)));
-        let clip = camera(0.01 * far_out, 100.0 * far_out);
+        let order = ORDERS[round % 2];
+        let clip = camera(0.01 * far_out, 100.0 * far_out, order);
         let point = |stream: &mut Stream| {
             [0; 3].map(|_| {
                 // On a face of the box every other time.
@@ -177,8 +234,8 @@ fn proxies_cover_their_contents() {
         let triangles: Vec<[u32; 3]> = (0..4).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         let bounds = Aabb::of_points(&positions);
         let error = ClipError::of(&clip, &world, bounds.max_abs());
-        let seen = ClipBox::new(&bounds, &(clip * world), &error);
-        let mut image = Image::new(VIEWPORT);
+        let seen = ClipBox::new(&bounds, &(clip * world), &error, order);
+        let mut image = Image::ordered(VIEWPORT, order);
         let clip_from_object = rounded_clip_matrix(&(clip * world));
         let draw = Draw {
             positions: &positions,
@@ -204,11 +261,10 @@ fn proxies_cover_their_contents() {
                 samples += shown.len();
             }
         }
-        if let Some(grown) =
-            inflated_box(&bounds, &(clip * world), &error, (VIEWPORT.width, VIEWPORT.height))
-        {
+        let pixels = (VIEWPORT.width, VIEWPORT.height);
+        if let Some(grown) = inflated_box(&bounds, &(clip * world), &error, pixels, order) {
             boxes += 1;
-            let mut proxy = Image::new(VIEWPORT);
+            let mut proxy = Image::ordered(VIEWPORT, order);
             draw_box(&mut proxy, &grown, clip_from_object);
             for &sample in &shown {
                 assert!(
@@ -243,7 +299,7 @@ fn draw_box(image: &mut Image, aabb: &Aabb, clip_from_object: [f32; 16]) {
 fn a_matrix_without_inverse_gives_no_box() {
     let flat = DMat4::from_cols(DVec4::X, DVec4::Y, DVec4::ZERO, DVec4::new(0.0, 0.0, 0.5, 1.0));
     let aabb = Aabb::new(DVec3::ZERO, DVec3::ONE);
-    assert_eq!(inflated_box(&aabb, &flat, &ClipError::ZERO, (10, 10)), None);
+    assert_eq!(inflated_box(&aabb, &flat, &ClipError::ZERO, (10, 10), DepthOrder::Forward), None);
 }
 
 /// The outline of a box in a viewport, with the rectangle and its depth; `None` where there is none.
@@ -271,7 +327,7 @@ fn diamond() -> ClipBox {
     let half = 0.4 / 2.0_f64.sqrt();
     let aabb = Aabb::new(DVec3::new(-half, -half, 0.5), DVec3::new(half, half, 0.6));
     let turned = DMat4::from_rotation_z(std::f64::consts::FRAC_PI_4);
-    ClipBox::new(&aabb, &turned, &ClipError::ZERO)
+    ClipBox::new(&aabb, &turned, &ClipError::ZERO, DepthOrder::Forward)
 }
 
 /// Beside a slanted side the hull holds what is as far from the box as its dilation, and not what is a
@@ -318,7 +374,8 @@ fn the_rectangle_stands_in_for_a_hull() {
             DVec4::new(0.0, 0.0, 0.0, 1.0),
         );
         let aabb = Aabb::new(DVec3::new(-1.0, -1.0, 0.5), DVec3::new(1.0, 1.0, 0.6));
-        outline(&ClipBox::new(&aabb, &slanted, &ClipError::ZERO), 100, &Margins::PROVEN)
+        let clip = ClipBox::new(&aabb, &slanted, &ClipError::ZERO, DepthOrder::Forward);
+        outline(&clip, 100, &Margins::PROVEN)
     };
     let grid = f64::from(1 << 20);
     assert!(matches!(reach(grid - 60.0), Some((Outline::Within { .. }, _))), "under it");
@@ -336,7 +393,8 @@ fn an_outline_beside_the_screen_is_nowhere() {
             DVec4::new(across, across, 0.0, 1.0),
         );
         let aabb = Aabb::new(DVec3::new(-1.0, -1.0, 0.5), DVec3::new(1.0, 1.0, 0.6));
-        outline(&ClipBox::new(&aabb, &slanted, &ClipError::ZERO), 100, &Margins::PROVEN)
+        let clip = ClipBox::new(&aabb, &slanted, &ClipError::ZERO, DepthOrder::Forward);
+        outline(&clip, 100, &Margins::PROVEN)
     };
     assert!(matches!(beside(1.2), Some((Outline::Nowhere, _))));
     assert!(matches!(beside(0.9), Some((Outline::Within { .. }, _))));
@@ -355,7 +413,7 @@ fn hulls_stay_within_their_rectangles() {
         (matrix.x_axis.z, matrix.y_axis.z, matrix.z_axis.z) = (0.0, 0.0, 0.1);
         (matrix.w_axis.z, matrix.w_axis.w) = (0.5, stream.range(1.0, 40.0));
         let aabb = Aabb::new(DVec3::splat(-1.0), DVec3::ONE);
-        let clip = ClipBox::new(&aabb, &matrix, &ClipError::ZERO);
+        let clip = ClipBox::new(&aabb, &matrix, &ClipError::ZERO, DepthOrder::Forward);
         let (width, height) = (1 + stream.below(300), 1 + stream.below(300));
         let Projection::Within { rectangle, depth } = clip.project(width, height) else { continue };
         let Outline::Within { hull, depth: nearer } =

@@ -9,7 +9,7 @@ use plainsight::oracle::wgpu::{GpuStage, Hardware, QUERIES_PER_PASS};
 use plainsight::oracle::{Answer, FrameView, Oracle, Proxy, Questions, Sim, Stage};
 use plainsight::part::{PartId, Partition, PartitionKnobs};
 use plainsight::scene::generate::{Knobs, build};
-use plainsight::scene::{Effects, Mesh, Object, Placement, Stream, Viewport};
+use plainsight::scene::{DepthOrder, Effects, Mesh, Object, Placement, Stream, Viewport};
 
 const IDENTITY: [f32; 16] =
     [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
@@ -189,7 +189,8 @@ fn hull(stream: &mut Stream, Viewport { width, height }: Viewport, depth: f32) -
     let turn = DMat4::from_rotation_z(place() * 3.0) * DMat4::from_rotation_x(place() * 0.2);
     let size = stream.range(0.01, 0.3);
     let aabb = Aabb::new(DVec3::splat(-size), DVec3::splat(size));
-    let clip = ClipBox::new(&aabb, &(DMat4::from_translation(at) * turn), &ClipError::ZERO);
+    let placed = DMat4::from_translation(at) * turn;
+    let clip = ClipBox::new(&aabb, &placed, &ClipError::ZERO, DepthOrder::Forward);
     let Projection::Within { rectangle, depth: nearest } = clip.project(width, height) else {
         return None;
     };

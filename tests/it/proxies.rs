@@ -18,7 +18,7 @@ use plainsight::math::{
     inflated_box_with, rounded_clip_matrix,
 };
 use plainsight::oracle::Proxy;
-use plainsight::scene::{Camera, Lens, Stream, Viewport};
+use plainsight::scene::{Camera, DepthOrder, Lens, Stream, Viewport};
 use plainsight_reference::{Draw, Faces, Image, naive};
 
 const VIEWPORT: Viewport = Viewport { width: 24, height: 18 };
@@ -66,6 +66,7 @@ const PROVEN: Proof = Proof { margins: Margins::PROVEN, transform: 1.0 };
 /// A box under its matrices, and triangles between its corners.
 #[derive(Clone, Debug)]
 struct Case {
+    order: DepthOrder,
     clip: DMat4,
     world: DMat4,
     min: [f32; 3],
@@ -95,8 +96,8 @@ struct Room {
 }
 
 impl Room {
-    fn new() -> Self {
-        Self { image: Image::new(VIEWPORT) }
+    fn new(order: DepthOrder) -> Self {
+        Self { image: Image::ordered(VIEWPORT, order) }
     }
 
     fn draw(&mut self, positions: &[[f32; 3]], triangles: &[[u32; 3]], matrix: [f32; 16]) {
@@ -136,7 +137,8 @@ impl Device {
             let c: [f32; 4] = std::array::from_fn(|row| {
                 ((m[row] * x + m[4 + row] * y) + m[8 + row] * z) + m[12 + row]
             });
-            if !(c[3] > 0.0 && (0.0..=c[3]).contains(&c[2])) {
+            let [near, far] = room.image.order().range();
+            if !(c[3] > 0.0 && (near * c[3]..=far * c[3]).contains(&c[2])) {
                 return None;
             }
             let r = 1.0 / c[3];
@@ -146,7 +148,7 @@ impl Device {
                 return None;
             }
             let [x, y] = self.placed(place);
-            snapped.push([x, y, (c[2] * r).clamp(0.0, 1.0)]);
+            snapped.push([x, y, (c[2] * r).clamp(near, far)]);
         }
         room.draw(&snapped, triangles, IDENTITY);
         Some(())
@@ -161,7 +163,7 @@ impl Device {
 }
 
 impl Case {
-    fn random(stream: &mut Stream) -> Self {
+    fn random(order: DepthOrder, stream: &mut Stream) -> Self {
         let power =
             |stream: &mut Stream, low: f64, high: f64| 10.0_f64.powf(stream.range(low, high));
         // How far out the contents are in their own space, and how large.
@@ -191,11 +193,11 @@ impl Case {
         let far = near * power(stream, 1.0, 6.0) + 4.0 * size;
         let (eye, forward) = (DVec3::ZERO, DVec3::NEG_Z);
         let lens = Lens::perspective(1.0);
-        let clip = Camera { eye, forward, lens, near, far }.clip_from_world(VIEWPORT);
+        let clip = Camera { eye, forward, lens, near, far }.clip_from_world(VIEWPORT, order);
         let corner = |stream: &mut Stream| stream.below(8);
         let triangles = (0..1 + stream.below(3)).map(|_| [0; 3].map(|_| corner(stream))).collect();
         let [min, max] = [1, 2].map(|i| [x[i] as f32, y[i] as f32, z[i] as f32]);
-        Self { clip, world, min, max, triangles }
+        Self { order, clip, world, min, max, triangles }
     }
 
     /// A small step away.
@@ -265,7 +267,7 @@ impl Case {
         let (matrix, error) = self.matrices();
         let error = ClipError { bound: error.bound.map(|bound| bound * proof.transform) };
         let pixels = (VIEWPORT.width, VIEWPORT.height);
-        let clip = ClipBox::new(&self.bounds(), &matrix, &error);
+        let clip = ClipBox::new(&self.bounds(), &matrix, &error, self.order);
         match clip.project_with(pixels.0, pixels.1, &proof.margins) {
             Projection::Nowhere => Err(false),
             Projection::Unbounded => Err(true),
@@ -285,8 +287,13 @@ impl Case {
                     }
                     Kind::Box => {
                         let bounds = self.bounds();
-                        let grown =
-                            inflated_box_with(&bounds, &matrix, &error, pixels, &proof.margins);
+                        let grown = inflated_box_with(
+                            &bounds,
+                            &matrix,
+                            &error,
+                            (pixels, self.order),
+                            &proof.margins,
+                        );
                         Ok(grown.map_or(plain, |grown| Proxy::Box {
                             clip_from_box: rounded_clip_matrix(&matrix),
                             min: grown.min.to_array().map(|c| c as f32),
@@ -324,7 +331,7 @@ impl Case {
             let place = [x as f64 + 0.5, y as f64 + 0.5];
             walls.iter().map(|&(n, h)| dot(n, place) - h).fold(f64::NEG_INFINITY, f64::max)
         };
-        let nearest = clip.iter().map(|c| c.z / c.w).fold(1.0, f64::min);
+        let nearest = clip.iter().map(|c| c.z / c.w).fold(f64::INFINITY, f64::min);
         let before = |shown: &Shown| nearest - f64::from(shown.depth);
         let most =
             |of: &dyn Fn(&Shown) -> f64| shown.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
@@ -402,7 +409,7 @@ fn passes(case: &Case, proxy: &Proxy, at: Shown, room: &mut Room) -> bool {
     {
         let corner = |x: usize, y: usize| {
             let [x, y] = REFERENCE.placed([x as f32, y as f32]);
-            [x, y, 0.0]
+            [x, y, case.order.range()[0]]
         };
         let quad = [corner(x0, y0), corner(x1, y0), corner(x1, y1), corner(x0, y1)];
         room.draw(&quad, &[[0, 1, 2], [0, 2, 3]], IDENTITY);
@@ -427,12 +434,12 @@ struct Tally {
 
 /// Climbs from `starts` random starts; `visit` sees each step on each device and says whether to go on.
 fn search(
-    name: &str,
+    (name, order): (&str, DepthOrder),
     starts: u32,
     devices: &[Device],
     mut visit: impl FnMut(&Case, Device, &[Shown], &mut Room) -> bool,
 ) {
-    let mut room = Room::new();
+    let mut room = Room::new(order);
     let mut stream = Stream::new(11, name);
     for start in 0..starts {
         let goal = if start % 3 == 2 { Goal::Depth } else { Goal::Pixels };
@@ -441,7 +448,7 @@ fn search(
         for _ in 0..STEPS {
             let case = match &best {
                 Some((_, best)) => best.moved(&mut stream),
-                None => Case::random(&mut stream),
+                None => Case::random(order, &mut stream),
             };
             let shown = case.shown(device, &mut room);
             if shown.is_empty() {
@@ -463,9 +470,9 @@ fn search(
 }
 
 /// Puts every proxy to the search; panics with the case where one misses a sample.
-fn attack(name: &str, starts: u32) -> Tally {
+fn attack(name: &str, order: DepthOrder, starts: u32) -> Tally {
     let mut tally = Tally { pixels: [f64::NEG_INFINITY; 2], ..Tally::default() };
-    search(name, starts, &[REFERENCE, COARSE], |case, device, shown, room| {
+    search((name, order), starts, &[REFERENCE, COARSE], |case, device, shown, room| {
         tally.cases += 1;
         tally.samples += shown.len() as u64;
         for kind in [Kind::Rectangle, Kind::Hull, Kind::Box] {
@@ -495,7 +502,16 @@ fn attack(name: &str, starts: u32) -> Tally {
 
 #[test]
 fn nothing_shows_that_a_proxy_misses() {
-    let tally = attack("proxies", STARTS);
+    attacked(DepthOrder::Forward);
+}
+
+#[test]
+fn nothing_shows_that_a_proxy_misses_with_reversed_depth() {
+    attacked(DepthOrder::Reversed);
+}
+
+fn attacked(order: DepthOrder) {
+    let tally = attack("proxies", order, STARTS);
     assert!(tally.samples > 100_000 && tally.cases > 5_000, "{tally:?} proves little");
     assert!(
         tally.hulls > 3_000 && tally.boxes > 1_000,
@@ -511,15 +527,17 @@ fn nothing_shows_that_a_proxy_misses() {
 #[ignore = "a long search, by hand"]
 fn nothing_shows_that_a_proxy_misses_in_a_long_search() {
     let starts = std::env::var(BY_HAND).ok().and_then(|text| text.parse().ok()).unwrap_or(20_000);
-    let tally = attack("proxies by hand", starts);
-    let talk = format!("{starts} starts: {tally:?}\n");
-    std::io::Write::write_all(&mut std::io::stderr(), talk.as_bytes()).unwrap();
+    for order in [DepthOrder::Forward, DepthOrder::Reversed] {
+        let tally = attack("proxies by hand", order, starts);
+        let talk = format!("{order:?}, {starts} starts: {tally:?}\n");
+        std::io::Write::write_all(&mut std::io::stderr(), talk.as_bytes()).unwrap();
+    }
 }
 
 /// The case in which a proxy with less than the proven margins misses a sample, if the search finds one.
-fn falls(kind: Kind, device: Device, proof: &Proof) -> Option<Case> {
+fn falls(order: DepthOrder, kind: Kind, device: Device, proof: &Proof) -> Option<Case> {
     let mut found = None;
-    search("teeth", STARTS_WITH_TEETH, &[device], |case, device, shown, room| {
+    search(("teeth", order), STARTS_WITH_TEETH, &[device], |case, device, shown, room| {
         if missed(case, (kind, device, proof), shown, room).is_some() {
             found = Some(case.clone());
         }
@@ -559,19 +577,29 @@ fn the_search_finds_what_each_margin_is_for() {
         ("no transform bound", Kind::Box, REFERENCE, with(&no_transform)),
     ];
     for (lacks, kind, device, proof) in teeth {
-        let found = falls(kind, device, &proof);
+        let found = falls(DepthOrder::Forward, kind, device, &proof);
         assert!(found.is_some(), "{kind:?} with {lacks} on {device:?} stood");
+        // A margin of depth is another where depth is reversed.
+        if lacks == "no depth" || kind == Kind::Box {
+            let found = falls(DepthOrder::Reversed, kind, device, &proof);
+            assert!(found.is_some(), "reversed, {kind:?} with {lacks} on {device:?} stood");
+        }
     }
     // At the bound nothing is found: the transform bound takes what f32 does besides.
     let at = |snap: f64| with(&move |p: &mut Proof| p.margins.rectangle_pixels = snap);
     for (device, snap) in [(REFERENCE, 1.0 / 512.0), (COARSE, 1.0 / 32.0)] {
         assert!(snap < RECTANGLE_DILATION_PIXELS);
         let mut found = None;
-        search("at the bound", STARTS / 4, &[device], |case, device, shown, room| {
-            let miss = missed(case, (Kind::Rectangle, device, &at(snap)), shown, room);
-            found = found.or(miss);
-            found.is_none()
-        });
+        search(
+            ("at the bound", DepthOrder::Forward),
+            STARTS / 4,
+            &[device],
+            |case, device, shown, room| {
+                let miss = missed(case, (Kind::Rectangle, device, &at(snap)), shown, room);
+                found = found.or(miss);
+                found.is_none()
+            },
+        );
         assert!(found.is_none(), "{found:?}");
     }
 }

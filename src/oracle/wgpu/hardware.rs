@@ -93,7 +93,7 @@ impl Hardware {
     /// # Panics
     /// Where the stage has not enough memory for its largest mesh.
     pub fn new(stage: &Arc<GpuStage>, questions: Questions) -> Result<Self, OracleError> {
-        let images = Images::new(&stage.gpu, stage.stage.viewport, false);
+        let images = Images::new(stage, false);
         let pyramid = (questions == Questions::Pyramid)
             .then(|| Pyramid::new(&stage.gpu, stage.stage.viewport));
         let limited = stage.stage.memory.map(|knobs| {
@@ -132,8 +132,11 @@ impl Hardware {
 
     /// What the shader is told of an object.
     fn drawn_object(&self, object: ObjectId) -> DrawnObject {
+        let order = self.stage.stage.depth;
+        let mut clip_from_object = self.matrices[object.0 as usize];
+        clip_from_object.iter_mut().skip(2).step_by(4).for_each(|z| *z = order.on_device(*z));
         DrawnObject {
-            clip_from_object: self.matrices[object.0 as usize],
+            clip_from_object,
             first_part: self.stage.stage.partition.first_part(object).0,
             padding: [0; 3],
         }
@@ -424,7 +427,8 @@ impl Hardware {
         from: usize,
         clear: bool,
     ) -> usize {
-        let load = if clear { wgpu::LoadOp::Clear(1.0) } else { wgpu::LoadOp::Load };
+        let load =
+            if clear { wgpu::LoadOp::Clear(self.stage.clear_depth()) } else { wgpu::LoadOp::Load };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             depth_stencil_attachment: Some(self.images.depth_attachment(load)),
             occlusion_query_set: slot.map(|(slot, set)| &slot.queries[set]),
@@ -531,7 +535,7 @@ impl Oracle for Hardware {
         if self.questions != Questions::Queries {
             return self.ask_rectangles(proxies);
         }
-        let first_vertex = self.proxy_vertices.len() as u32;
+        let (first_vertex, order) = (self.proxy_vertices.len(), self.stage.stage.depth);
         let viewport = self.stage.stage.viewport;
         for proxy in proxies {
             match *proxy {
@@ -546,7 +550,9 @@ impl Oracle for Hardware {
                 }
             }
         }
-        let end_vertex = self.proxy_vertices.len() as u32;
+        let new = &mut self.proxy_vertices[first_vertex..];
+        new.iter_mut().for_each(|vertex| vertex[2] = order.on_device(vertex[2]));
+        let (first_vertex, end_vertex) = (first_vertex as u32, self.proxy_vertices.len() as u32);
         self.events.push(Event::Ask { first_vertex, end_vertex });
         self.number()
     }
@@ -579,10 +585,7 @@ impl Oracle for Hardware {
     }
 
     fn redraw(&mut self, parts: &[PartId]) -> Result<Option<ReadBack>, OracleError> {
-        let images = self
-            .redraw_images
-            .take()
-            .unwrap_or_else(|| Images::new(&self.stage.gpu, self.stage.stage.viewport, true));
+        let images = self.redraw_images.take().unwrap_or_else(|| Images::new(&self.stage, true));
         let mut encoder = self.encoder();
         let drawn_object = |object| self.drawn_object(object);
         encode_redraw(&self.stage, &drawn_object, &mut encoder, &images, parts);

@@ -1,13 +1,14 @@
 //! Render targets and their way back to this side.
 
 use super::gpu::Gpu;
-use super::stage::{DEPTH, IDS};
+use super::stage::{DEPTH, GpuStage, IDS};
 use crate::oracle::{OracleError, ReadBack};
-use crate::scene::Viewport;
+use crate::scene::{DepthOrder, Viewport};
 
 /// A depth target, with part ids where they are wanted.
 pub(super) struct Images {
     viewport: Viewport,
+    order: DepthOrder,
     depth: wgpu::Texture,
     pub(super) depth_view: wgpu::TextureView,
     ids: Option<(wgpu::Texture, wgpu::TextureView)>,
@@ -27,7 +28,8 @@ impl Images {
         }
     }
 
-    pub(super) fn new(gpu: &Gpu, viewport: Viewport, with_ids: bool) -> Self {
+    pub(super) fn new(stage: &GpuStage, with_ids: bool) -> Self {
+        let (gpu, viewport, order) = (&stage.gpu, stage.stage.viewport, stage.stage.depth);
         let texture = |format| {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
                 label: None,
@@ -50,7 +52,7 @@ impl Images {
             (ids, view)
         });
         let staging = staging(gpu, viewport, if with_ids { 2 } else { 1 });
-        Self { viewport, depth_view: view(&depth), depth, ids, staging }
+        Self { viewport, order, depth_view: view(&depth), depth, ids, staging }
     }
 
     /// Pixels.
@@ -96,12 +98,23 @@ impl Images {
                 slice.get_mapped_range().map_err(|error| OracleError::Lost(error.to_string()))?;
             let (depth, ids) = mapped.split_at(image_bytes(self.viewport) as usize);
             ReadBack {
-                depth: self.rows(depth).map(f32::from_bits).collect(),
+                depth: self.depths(self.rows(depth)).collect(),
                 parts: self.ids.is_some().then(|| self.rows(ids).collect()),
             }
         };
         self.staging.unmap();
         Ok(read_back)
+    }
+
+    /// Depths of words as the device stores them.
+    pub(super) fn depths(&self, words: impl Iterator<Item = u32>) -> impl Iterator<Item = f32> {
+        let order = self.order;
+        words.map(move |word| order.on_device(f32::from_bits(word)))
+    }
+
+    /// Which way depth runs.
+    pub(super) fn order(&self) -> DepthOrder {
+        self.order
     }
 
     fn copy(

@@ -6,7 +6,7 @@
 //! The maxima are those of a hierarchical z-buffer (Greene, Kass & Miller 1993), built on the device.
 
 use super::gpu::Gpu;
-use crate::scene::Viewport;
+use crate::scene::{DepthOrder, Viewport};
 
 /// Samples along a tile, and tiles along a block.
 const SIDE: u32 = 8;
@@ -39,7 +39,7 @@ pub(super) struct Pyramid {
 }
 
 impl Pipelines {
-    pub(super) fn new(device: &wgpu::Device) -> Self {
+    pub(super) fn new(device: &wgpu::Device, order: DepthOrder) -> Self {
         let shader = device.create_shader_module(wgpu::include_wgsl!("pyramid.wgsl"));
         let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
             binding,
@@ -73,13 +73,17 @@ impl Pipelines {
             bind_group_layouts: &[Some(&layout)],
             immediate_size: 0,
         });
+        let reversed = f64::from(u8::from(order == DepthOrder::Reversed));
         let pipeline = |entry_point| {
             device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: None,
                 layout: Some(&pipeline_layout),
                 module: &shader,
                 entry_point: Some(entry_point),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: &[("reversed", reversed)],
+                    ..Default::default()
+                },
                 cache: None,
             })
         };

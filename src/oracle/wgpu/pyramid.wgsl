@@ -10,6 +10,9 @@ struct Ask {
     question: u32,
 }
 
+// Whether the target holds reversed depth: what is stored, its sign turned, is what questions compare.
+override reversed: bool = false;
+
 @group(0) @binding(0) var depth: texture_depth_2d;
 @group(0) @binding(1) var<storage, read_write> tiles: array<f32>;
 @group(0) @binding(2) var<storage, read_write> blocks: array<f32>;
@@ -17,6 +20,11 @@ struct Ask {
 @group(0) @binding(4) var<storage, read_write> answers: array<atomic<u32>>;
 // First ask and one beyond the last of the dispatch.
 @group(0) @binding(5) var<storage, read> run: array<vec2<u32>>;
+
+fn stored(place: vec2<u32>) -> f32 {
+    let depth = textureLoad(depth, place, 0);
+    return select(depth, -depth, reversed);
+}
 
 fn tile_count() -> vec2<u32> {
     return (textureDimensions(depth) + 7u) / 8u;
@@ -33,10 +41,11 @@ fn reduce_tiles(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let end = min(id.xy * 8u + 8u, textureDimensions(depth));
-    var most = 0.0;
+    // Nearer than everything, either way.
+    var most = -1.0;
     for (var y = id.y * 8u; y < end.y; y++) {
         for (var x = id.x * 8u; x < end.x; x++) {
-            most = max(most, textureLoad(depth, vec2<u32>(x, y), 0));
+            most = max(most, stored(vec2<u32>(x, y)));
         }
     }
     tiles[id.y * count.x + id.x] = most;
@@ -50,7 +59,8 @@ fn reduce_blocks(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let tiled = tile_count();
     let end = min(id.xy * 8u + 8u, tiled);
-    var most = 0.0;
+    // Nearer than everything, either way.
+    var most = -1.0;
     for (var y = id.y * 8u; y < end.y; y++) {
         for (var x = id.x * 8u; x < end.x; x++) {
             most = max(most, tiles[y * tiled.x + x]);
@@ -68,7 +78,7 @@ fn any_sample(ask: Ask, tile: vec2<u32>) -> bool {
     let high = min(ask.high, tile * 8u + 8u);
     for (var y = low.y; y < high.y; y++) {
         for (var x = low.x; x < high.x; x++) {
-            if textureLoad(depth, vec2<u32>(x, y), 0) >= ask.depth {
+            if stored(vec2<u32>(x, y)) >= ask.depth {
                 return true;
             }
         }

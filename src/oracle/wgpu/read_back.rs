@@ -9,6 +9,7 @@ use super::images::Images;
 use super::pyramid::Ask;
 use crate::oracle::OracleError;
 use crate::oracle::maxima::{DepthMaxima, DepthRows};
+use crate::scene::DepthOrder;
 
 /// Copies of the target on their way at once; one more waits for the oldest, so that memory stays
 /// bounded however often draws and questions alternate.
@@ -19,6 +20,8 @@ pub(super) const MOST_COPIES: usize = 4;
 pub(super) struct DepthReader {
     free: Vec<wgpu::Buffer>,
     maxima: DepthMaxima,
+    /// Room for depths whose sign is turned.
+    turned: Vec<f32>,
 }
 
 impl DepthReader {
@@ -49,8 +52,14 @@ impl DepthReader {
                 .get_mapped_range()
                 .map_err(|error| OracleError::Lost(error.to_string()))?;
             let (viewport, stride) = (images.viewport(), images.stride());
+            let mut samples: &[f32] = bytemuck::cast_slice(&mapped);
+            if images.order() == DepthOrder::Reversed {
+                self.turned.clear();
+                self.turned.extend(samples.iter().map(|&depth| images.order().on_device(depth)));
+                samples = &self.turned;
+            }
             let image = DepthRows {
-                samples: bytemuck::cast_slice(&mapped),
+                samples,
                 stride,
                 width: viewport.width as usize,
                 height: viewport.height as usize,

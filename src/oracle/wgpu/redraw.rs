@@ -57,7 +57,9 @@ pub(super) fn encode_redraw(
     });
     let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         color_attachments: &[ids],
-        depth_stencil_attachment: Some(images.depth_attachment(wgpu::LoadOp::Clear(1.0))),
+        depth_stencil_attachment: Some(
+            images.depth_attachment(wgpu::LoadOp::Clear(stage.clear_depth())),
+        ),
         ..Default::default()
     });
     pass.set_pipeline(&stage.draw_ids);

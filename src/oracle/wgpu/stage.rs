@@ -9,6 +9,7 @@ use super::gpu::Gpu;
 use super::pyramid;
 use crate::oracle::{OracleError, Stage};
 use crate::part::PartedMesh;
+use crate::scene::DepthOrder;
 
 /// Depth of every target.
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -89,6 +90,14 @@ pub struct GpuStage {
 }
 
 impl GpuStage {
+    /// What the depth target is cleared to.
+    pub(super) fn clear_depth(&self) -> f32 {
+        let [_, far] = self.stage.depth.range();
+        self.stage.depth.on_device(far)
+    }
+}
+
+impl GpuStage {
     /// Uploads every mesh once and builds the pipelines.
     ///
     /// # Errors
@@ -101,7 +110,7 @@ impl GpuStage {
             return Err(OracleError::Lost(what));
         }
         let meshes = stage.partition.meshes().iter().map(|mesh| upload(device, mesh)).collect();
-        let pipelines = Pipelines::new(device);
+        let pipelines = Pipelines::new(device, stage.depth);
         let made = Arc::new(Self {
             gpu: Arc::clone(gpu),
             stage: stage.clone(),
@@ -109,10 +118,21 @@ impl GpuStage {
             draw: pipelines.part(None),
             draw_ids: pipelines.part(Some(IDS)),
             ask: pipelines.proxy(),
-            pyramid: pyramid::Pipelines::new(device),
+            pyramid: pyramid::Pipelines::new(device, stage.depth),
         });
         gpu.wait(None)?;
         Ok(made)
+    }
+}
+
+/// A comparison of depths as the device makes it, whose reversed depths are greater the nearer.
+fn on_device(order: DepthOrder, compare: wgpu::CompareFunction) -> wgpu::CompareFunction {
+    match (order, compare) {
+        (DepthOrder::Reversed, wgpu::CompareFunction::Less) => wgpu::CompareFunction::Greater,
+        (DepthOrder::Reversed, wgpu::CompareFunction::LessEqual) => {
+            wgpu::CompareFunction::GreaterEqual
+        }
+        (_, compare) => compare,
     }
 }
 
@@ -141,17 +161,18 @@ struct Pipelines<'a> {
     device: &'a wgpu::Device,
     shader: wgpu::ShaderModule,
     layout: wgpu::PipelineLayout,
+    order: DepthOrder,
 }
 
 impl<'a> Pipelines<'a> {
-    fn new(device: &'a wgpu::Device) -> Self {
+    fn new(device: &'a wgpu::Device, order: DepthOrder) -> Self {
         let shader = device.create_shader_module(wgpu::include_wgsl!("shader.wgsl"));
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: None,
             bind_group_layouts: &[],
             immediate_size: size_of::<DrawnObject>() as u32,
         });
-        Self { device, shader, layout }
+        Self { device, shader, layout, order }
     }
 
     fn part(&self, ids: Option<wgpu::TextureFormat>) -> wgpu::RenderPipeline {
@@ -197,7 +218,7 @@ impl<'a> Pipelines<'a> {
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH,
                 depth_write_enabled: Some(write),
-                depth_compare: Some(compare),
+                depth_compare: Some(on_device(self.order, compare)),
                 stencil: wgpu::StencilState::default(),
                 bias: wgpu::DepthBiasState::default(),
             }),

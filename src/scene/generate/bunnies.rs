@@ -83,6 +83,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
             far: 8.0 * side + 20.0,
         }],
         viewport: chosen.viewport,
+        depth: chosen.depth,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
         effects: Effects { motion: Some(Motion { movers }), ..Effects::default() },

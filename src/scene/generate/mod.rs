@@ -12,7 +12,7 @@ mod soup;
 
 use std::path::PathBuf;
 
-use super::{LEAF_TRIANGLES, Scene, SceneError, Viewport, file};
+use super::{DepthOrder, LEAF_TRIANGLES, Scene, SceneError, Viewport, file};
 
 pub use hard::HARD;
 pub use shape::blob;
@@ -28,6 +28,8 @@ pub struct Knobs {
     pub frames: Option<u32>,
     /// Pixels; 1280 × 1024 by default, in most scenes.
     pub viewport: Option<Viewport>,
+    /// Which way depth runs; forward by default, in most scenes.
+    pub depth: Option<DepthOrder>,
     /// A model in the place of the generated shape.
     pub mesh: Option<PathBuf>,
     /// Where the camera of an imported model goes.
@@ -51,6 +53,7 @@ pub(super) struct Chosen {
     pub(super) scale: f64,
     pub(super) frames: u32,
     pub(super) viewport: Viewport,
+    pub(super) depth: DepthOrder,
     pub(super) leaf_triangles: u32,
     pub(super) mesh: Option<PathBuf>,
     pub(super) camera: CameraMode,
@@ -80,6 +83,7 @@ impl Knobs {
             scale,
             frames,
             viewport,
+            depth: self.depth.unwrap_or(generator.depth),
             leaf_triangles: generator.leaf_triangles,
             mesh: self.mesh.clone(),
             camera: self.camera.unwrap_or(CameraMode::Orbit),
@@ -99,6 +103,8 @@ pub struct Generator {
     pub full_size_frames: Option<u32>,
     /// Pixels where none are asked for.
     pub viewport: Viewport,
+    /// Which way depth runs where nothing is asked for.
+    pub depth: DepthOrder,
     /// Frames of a run where none are asked for.
     pub frames: u32,
     /// Most triangles in a part where no number is asked for.
@@ -112,6 +118,7 @@ pub(super) const USUAL: Generator = Generator {
     summary: "",
     full_size_frames: None,
     viewport: Viewport { width: 1280, height: 1024 },
+    depth: DepthOrder::Forward,
     frames: 24,
     leaf_triangles: LEAF_TRIANGLES,
     build: |_| unreachable!("nothing is called like it"),

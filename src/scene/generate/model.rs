@@ -37,6 +37,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         objects,
         cameras: vec![camera(chosen, &bounds)],
         viewport: chosen.viewport,
+        depth: chosen.depth,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
         effects: Effects::default(),

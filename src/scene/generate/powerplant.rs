@@ -171,6 +171,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         objects: plant.objects,
         cameras: vec![fly_through(row, bays.div_ceil(row), chosen.frames)],
         viewport: chosen.viewport,
+        depth: chosen.depth,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
         effects: Effects::default(),

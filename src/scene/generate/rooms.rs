@@ -88,6 +88,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         objects,
         cameras: vec![walk(chosen, rooms)],
         viewport: chosen.viewport,
+        depth: chosen.depth,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
         effects: Effects { motion: Some(Motion { movers }), ..Effects::default() },

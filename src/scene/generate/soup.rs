@@ -73,6 +73,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
             far: SPACE * 8.0,
         }],
         viewport: chosen.viewport,
+        depth: chosen.depth,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
         effects: Effects { motion: Some(Motion { movers }), ..Effects::default() },

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{Builder, Placement, SMALL, Site, cube, glide, pose, scaled, wall};
 use crate::scene::generate::{Chosen, Generator, shape};
-use crate::scene::{CameraPath, Lens, Scene, SceneError, Stream, Travel, Viewport};
+use crate::scene::{CameraPath, DepthOrder, Lens, Scene, SceneError, Stream, Travel, Viewport};
 
 pub(super) const NEAR_PLANE: Generator = Generator {
     name: "hard/near-plane",
@@ -191,6 +191,48 @@ fn depth_ratio(chosen: &Chosen) -> Result<Scene, SceneError> {
     receding(&mut site, chosen, 6);
     let poses = [pose([0.0, 0.0, 0.0], [0.0, 0.0, -1.0]), pose([0.0, 0.1, 0.0], [0.02, 0.1, -1.0])];
     Ok(site.finish(chosen, DEPTH_RATIO.name, glide(chosen, &poses, 60.0, [0.1, 1.0e6])))
+}
+
+pub(super) const REVERSED_DEPTH: Generator = Generator {
+    name: "hard/reversed-depth",
+    summary: "depth from 1 near to 0 far, and a far plane ten million times farther than the near one",
+    depth: DepthOrder::Reversed,
+    build: reversed_depth,
+    ..SMALL
+};
+
+fn reversed_depth(chosen: &Chosen) -> Result<Scene, SceneError> {
+    let scene = depth_ratio(chosen)?;
+    Ok(Scene { name: REVERSED_DEPTH.name.to_owned(), ..scene })
+}
+
+pub(super) const REVERSED_INFINITE: Generator = Generator {
+    name: "hard/reversed-infinite",
+    summary: "reversed depth without a far plane: twelve decades of distance, told apart to the end",
+    depth: DepthOrder::Reversed,
+    build: reversed_infinite,
+    ..SMALL
+};
+
+fn reversed_infinite(chosen: &Chosen) -> Result<Scene, SceneError> {
+    let mut site = Site::default();
+    receding(&mut site, chosen, 12);
+    let poses = [pose([0.0, 0.0, 0.0], [0.0, 0.0, -1.0]), pose([0.0, 0.1, 0.0], [0.02, 0.1, -1.0])];
+    let camera = glide(chosen, &poses, 60.0, [0.1, f64::INFINITY]);
+    Ok(site.finish(chosen, REVERSED_INFINITE.name, camera))
+}
+
+pub(super) const REVERSED_NEAR: Generator = Generator {
+    name: "hard/reversed-near",
+    summary: "the near plane goes through boxes and triangles, where reversed depth is 1",
+    depth: DepthOrder::Reversed,
+    build: reversed_near,
+    ..SMALL
+};
+
+fn reversed_near(chosen: &Chosen) -> Result<Scene, SceneError> {
+    let scene = (NEAR_PLANE.build)(chosen)?;
+    Ok(Scene { name: REVERSED_NEAR.name.to_owned(), ..scene })
 }
 
 /// Blobs and boxes ahead, each decade of distance ten times larger: the picture of each is alike, and

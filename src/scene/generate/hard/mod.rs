@@ -39,6 +39,9 @@ pub const HARD: &[Generator] = &[
     camera::WIDE_ANGLE,
     camera::INFINITE_FAR,
     camera::DEPTH_RATIO,
+    camera::REVERSED_DEPTH,
+    camera::REVERSED_INFINITE,
+    camera::REVERSED_NEAR,
     camera::STRAIGHT_DOWN,
     camera::EDGE_OF_VIEW,
     camera::ONE_PIXEL,
@@ -157,6 +160,7 @@ impl Site {
             objects,
             cameras,
             viewport: chosen.viewport,
+            depth: chosen.depth,
             frames: chosen.frames,
             leaf_triangles: chosen.leaf_triangles,
             effects: Effects {
