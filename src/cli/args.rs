@@ -108,7 +108,7 @@ pub(super) struct SceneArgs {
     #[arg(long, value_enum, default_value_t = ProxyArg::Rectangle)]
     pub(super) proxy: ProxyArg,
     /// What work costs the device, for adaptive cullers and virtual time: lavapipe, lavapipe-read-back,
-    /// or a file that `calibrate` wrote.
+    /// h100, or a file that `calibrate` wrote.
     #[arg(long, value_name = "NAME|FILE.toml", default_value = "lavapipe")]
     pub(super) cost: String,
     /// Out of core: the MiB of geometry that each lane's device may hold (default: all of it).

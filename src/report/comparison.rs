@@ -239,12 +239,14 @@ impl Comparison<'_> {
                 let theirs = paper(self.scene, "simple").zip(paper(self.scene, &trace.lane.culler));
                 let said = |ours: f64, of: &dyn Fn(Published, Published) -> f64| {
                     let theirs = theirs.map(|(s, f)| format!(" (paper {:.2})", of(s, f)));
-                    format!("{ours:.2}{}", theirs.unwrap_or_default())
+                    // One that asks nothing has no ratio.
+                    let ours = if ours.is_finite() { format!("{ours:.2}") } else { "-".to_owned() };
+                    format!("{ours}{}", theirs.unwrap_or_default())
                 };
                 text += &format!(
                     "simple ÷ {0} in queries: {1}; {0} ÷ simple in parts: {2}\n",
                     trace.lane.culler,
-                    said(asked / queries.max(1e-9), &|s, f| s.queries / f.queries),
+                    said(asked / queries, &|s, f| s.queries / f.queries),
                     said(parts / drawn, &|s, f| f.parts / s.parts),
                 );
             }

@@ -351,7 +351,7 @@ mod tests {
     use crate::scene::generate::{Knobs, build};
 
     fn world(seed: u64) -> World {
-        let viewport = Some(Viewport { width: 96, height: 64 });
+        let viewport = Some(crate::scene::Viewport { width: 96, height: 64 });
         let (scale, frames) = (Some(0.02), Some(12));
         let knobs = Knobs { seed: Some(seed), scale, frames, viewport, ..Knobs::default() };
         let knobs_of_parts = PartitionKnobs { leaf_triangles: 256, ..PartitionKnobs::default() };
