@@ -117,3 +117,104 @@ impl Clipper {
         kept
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VIEWPORT: Viewport = Viewport { width: 64, height: 32 };
+    const ORDERS: [DepthOrder; 2] = [DepthOrder::Forward, DepthOrder::Reversed];
+
+    /// A clipper and, at w = 2, a point on each of its planes with a step outward.
+    fn planes(order: DepthOrder) -> (Clipper, [(ClipVertex, ClipVertex); 6]) {
+        let clipper = Clipper::new(VIEWPORT, order);
+        let [near, far] = order.range().map(|depth| 2.0 * depth);
+        let inside = (near + far) * 0.5;
+        let (across, down) = (2.0 * clipper.across, 2.0 * clipper.down);
+        let planes = [
+            ([0.5, 0.5, near, 2.0], [0.0, 0.0, -1.0, 0.0]),
+            ([0.5, 0.5, far, 2.0], [0.0, 0.0, 1.0, 0.0]),
+            ([-across, 0.5, inside, 2.0], [-1.0, 0.0, 0.0, 0.0]),
+            ([across, 0.5, inside, 2.0], [1.0, 0.0, 0.0, 0.0]),
+            ([0.5, -down, inside, 2.0], [0.0, -1.0, 0.0, 0.0]),
+            ([0.5, down, inside, 2.0], [0.0, 1.0, 0.0, 0.0]),
+        ];
+        (clipper, planes)
+    }
+
+    fn moved(at: ClipVertex, step: ClipVertex, by: f32) -> ClipVertex {
+        std::array::from_fn(|c| at[c] + step[c] * by)
+    }
+
+    /// On a plane is inside; a step outward is beyond it and beyond no other.
+    #[test]
+    fn each_plane_is_closed() {
+        for order in ORDERS {
+            let (clipper, planes) = planes(order);
+            for (plane, (on, outward)) in planes.into_iter().enumerate() {
+                assert_eq!(clipper.outside(on), 0, "{order:?} plane {plane}: {on:?}");
+                assert_eq!(clipper.outside(moved(on, outward, 0.25)), 1 << plane, "{order:?}");
+                assert_eq!(clipper.outside(moved(on, outward, -0.25)), 0, "{order:?}");
+            }
+        }
+    }
+
+    /// The band ends a pixel within ±2¹⁵ on the far side, whatever the window's origin.
+    #[test]
+    fn the_guard_band_is_where_it_is_said() {
+        let clipper = Clipper::new(VIEWPORT, DepthOrder::Forward);
+        let column = clipper.across * 32.0 + 32.0;
+        let row = clipper.down * 16.0 + 16.0;
+        assert!(
+            (column - 32_767.0).abs() < 0.01 && (row - 32_767.0).abs() < 0.01,
+            "{column} {row}"
+        );
+    }
+
+    /// An edge across a plane is cut at the plane, to the same bits whichever way it goes.
+    #[test]
+    fn cuts_are_on_the_plane_and_shared() {
+        for order in ORDERS {
+            let (clipper, planes) = planes(order);
+            let middle = [0.5, 0.25, (order.range()[0] + order.range()[1]) * 0.5, 1.0];
+            for (plane, (on, outward)) in planes.into_iter().enumerate() {
+                // As far beyond the plane as twice the way from the middle: the cut is at a third of it.
+                let inside = moved(on, outward, -0.125);
+                let out = moved(on, outward, 0.25);
+                let there = clipper.clip([inside, out, middle]).expect("a part is left");
+                let back = clipper.clip([out, inside, middle]).expect("a part is left");
+                let cut = |polygon: &Polygon| {
+                    let on_edge = |c: &&ClipVertex| {
+                        (0..4).all(|i| (c[i] - on[i]).abs() <= on[i].abs() * 1e-5 + 1e-6)
+                    };
+                    polygon.corners().iter().find(on_edge).copied()
+                };
+                let (a, b) = (cut(&there).expect("a cut"), cut(&back).expect("a cut"));
+                assert_eq!(a.map(f32::to_bits), b.map(f32::to_bits), "{order:?} plane {plane}");
+                assert_eq!(there.corners().len(), 4, "{order:?} plane {plane}");
+                let least = there.corners().iter().map(|&c| clipper.distance(plane, c));
+                assert!(least.fold(f32::INFINITY, f32::min) > -0.01, "{order:?} plane {plane}");
+            }
+        }
+    }
+
+    /// Half of an edge, with numbers that f32 holds.
+    #[test]
+    fn a_cut_in_the_middle_is_exact() {
+        let clipper = Clipper::new(VIEWPORT, DepthOrder::Forward);
+        let triangle = [[4.0, 2.0, -1.0, 8.0], [8.0, 6.0, 1.0, 16.0], [0.0, 6.0, 1.0, 16.0]];
+        let polygon = clipper.clip(triangle).unwrap();
+        let expected = [[2.0, 4.0, 0.0, 12.0], [6.0, 4.0, 0.0, 12.0], triangle[1], triangle[2]];
+        assert_eq!(polygon.corners().len(), 4);
+        for corner in expected {
+            assert!(polygon.corners().contains(&corner), "{corner:?} in {polygon:?}");
+        }
+    }
+
+    #[test]
+    fn only_points_before_the_eye_project() {
+        let w = |w: f32| projects(&[0.0, 0.0, 0.0, w]);
+        assert!(w(1.0) && w(f32::MIN_POSITIVE) && w(f32::MAX));
+        assert!(!w(0.0) && !w(-1.0) && !w(1e-45) && !w(f32::NAN));
+    }
+}

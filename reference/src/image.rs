@@ -52,7 +52,6 @@ pub struct Image {
 
 /// One region of an image that is being drawn.
 pub(crate) struct Region<'a> {
-    pub(crate) order: DepthOrder,
     /// Its first column and row in the image.
     pub(crate) origin: [i32; 2],
     /// Columns and rows of it that lie within the image, at least 1.
@@ -121,7 +120,6 @@ impl Image {
     /// The regions, row by row.
     pub(crate) fn regions(&mut self) -> impl Iterator<Item = Region<'_>> {
         let (width, height) = (self.viewport.width as usize, self.viewport.height as usize);
-        let order = self.order;
         let across = width.div_ceil(REGION);
         let words = self.words.chunks_exact_mut(REGION * REGION);
         let far = self.far.chunks_exact_mut(BLOCKS * BLOCKS);
@@ -129,7 +127,7 @@ impl Image {
         words.zip(far).zip(stale).enumerate().map(move |(i, ((words, far), stale))| {
             let (x, y) = (i % across * REGION, i / across * REGION);
             let size = [(width - x).min(REGION) as i32, (height - y).min(REGION) as i32];
-            Region { order, origin: [x as i32, y as i32], size, words, far, stale }
+            Region { origin: [x as i32, y as i32], size, words, far, stale }
         })
     }
 

@@ -31,6 +31,7 @@ impl DepthOrder {
     /// Every depth between the planes as a whole number that orders like it: 0 at the near plane, the
     /// bits of 1.0 at the far one, neighbours one apart. −0 and +0 are one depth.
     #[must_use]
+    #[inline(always)]
     pub const fn key(self, depth: f32) -> u32 {
         match self {
             // Bits of floats that are not negative order like the numbers.
@@ -41,6 +42,7 @@ impl DepthOrder {
 
     /// The depth of a key, or of the first beyond the far plane, which is behind every depth; never −0.
     #[must_use]
+    #[inline(always)]
     pub const fn depth(self, key: u32) -> f32 {
         match self {
             Self::Forward => f32::from_bits(key),
@@ -58,6 +60,27 @@ impl DepthOrder {
             Self::Reversed => 0.0 - depth,
         }
     }
+}
+
+/// A depth order known when code is compiled, so that inner loops do not ask for it.
+pub(crate) trait Order: Copy + Send + Sync {
+    const ORDER: DepthOrder;
+}
+
+/// [`DepthOrder::Forward`].
+#[derive(Clone, Copy)]
+pub(crate) struct Forward;
+
+/// [`DepthOrder::Reversed`].
+#[derive(Clone, Copy)]
+pub(crate) struct Reversed;
+
+impl Order for Forward {
+    const ORDER: DepthOrder = DepthOrder::Forward;
+}
+
+impl Order for Reversed {
+    const ORDER: DepthOrder = DepthOrder::Reversed;
 }
 
 #[cfg(test)]

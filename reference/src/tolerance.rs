@@ -314,3 +314,148 @@ fn distance(a: WindowVertex, b: WindowVertex, [x, y]: [i64; 2]) -> f64 {
     let (x, y) = (px - along * dx, py - along * dy);
     (x * x + y * y).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::Faces;
+
+    const IDENTITY: [f32; 16] =
+        [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    /// One sample, at the origin of clip space.
+    const ONE: Viewport = Viewport { width: 1, height: 1 };
+
+    /// Fates of parts of one triangle each.
+    fn of(viewport: Viewport, triangles: &[[[f32; 3]; 3]], tolerance: Tolerance) -> Fates {
+        let draws: Vec<Draw<'_>> = triangles
+            .iter()
+            .zip(0..)
+            .map(|(positions, first_draw)| Draw {
+                positions,
+                triangles: &[[0, 1, 2]],
+                ranks: &[0],
+                first_draw,
+                clip_from_object: IDENTITY,
+                faces: Faces::Both,
+            })
+            .collect();
+        fates(viewport, DepthOrder::Forward, &draws, tolerance)
+    }
+
+    fn within(pixels: f64) -> Tolerance {
+        Tolerance { pixels, ..Tolerance::EXACT }
+    }
+
+    /// A triangle whose left side stands `beyond` pixels to the right of the sample, or leans the same
+    /// distance off at a slope of 3 to 4; all else is far away.
+    fn sides(beyond: f32) -> [[[f32; 3]; 3]; 2] {
+        // A pixel of a 1 × 1 viewport is two units; the sample is at the origin, rows go down.
+        let at = |x: f32, y: f32| [2.0 * x, -2.0 * y, 0.5];
+        let upright = [at(beyond, -40.0), at(beyond, 40.0), at(80.0, 0.0)];
+        // The side passes (0.8, 0.6)·beyond along (−0.6, 0.8).
+        let (x, y) = (0.8 * beyond, 0.6 * beyond);
+        let leaning = [at(x + 30.0, y - 40.0), at(x - 30.0, y + 40.0), at(90.0, 70.0)];
+        [upright, leaning]
+    }
+
+    #[test]
+    fn edges_are_displaced_by_the_tolerance() {
+        // A quarter pixel, and a step of the window's grid.
+        let (quarter, step) = (0.25_f64, 1.0 / 256.0);
+        for (i, triangle) in sides(-0.25).into_iter().enumerate() {
+            // Snapping moves the leaning side by at most half a step along either axis.
+            let slack = if i == 0 { 1e-6 } else { step };
+            assert_eq!(of(ONE, &[triangle], within(quarter + slack)).parts, [Fate::May]);
+            assert_eq!(of(ONE, &[triangle], within(quarter - slack)).parts, [Fate::Must]);
+            assert_eq!(of(ONE, &[triangle], Tolerance::EXACT).parts, [Fate::Must]);
+        }
+        for (i, triangle) in sides(0.25).into_iter().enumerate() {
+            let slack = if i == 0 { 1e-6 } else { step };
+            assert_eq!(of(ONE, &[triangle], within(quarter + slack)).parts, [Fate::May]);
+            assert_eq!(of(ONE, &[triangle], within(quarter - slack)).parts, [Fate::Hidden]);
+            assert_eq!(of(ONE, &[triangle], Tolerance::EXACT).parts, [Fate::Hidden]);
+        }
+        // Exactly at the bound: inside it does not count as sure, outside it may be covered.
+        assert_eq!(of(ONE, &[sides(-0.25)[0]], within(quarter)).parts, [Fate::May]);
+        assert_eq!(of(ONE, &[sides(0.25)[0]], within(quarter)).parts, [Fate::May]);
+    }
+
+    #[test]
+    fn depth_is_off_along_the_slope() {
+        // 0.1 a pixel to the right and 0.06 down: a fifth of a pixel is 0.032.
+        let plane = |x: f32, y: f32| [x, y, 0.4 + 0.05 * x - 0.03 * y];
+        let tilted = [plane(-3.0, -3.0), plane(3.0, -3.0), plane(0.0, 4.0)];
+        let flat = |z: f32| [[-9.0, -9.0, z], [9.0, -9.0, z], [0.0, 9.0, z]];
+        let fates = |z: f32| of(ONE, &[tilted, flat(z)], within(0.2)).parts;
+        assert_eq!(fates(0.4325), [Fate::Must, Fate::Hidden], "over the slope");
+        assert_eq!(fates(0.4315), [Fate::May, Fate::May], "under it");
+        assert_eq!(fates(0.3685), [Fate::May, Fate::May]);
+        assert_eq!(fates(0.3675), [Fate::Hidden, Fate::Must]);
+    }
+
+    #[test]
+    fn depths_are_off_by_ulps() {
+        let flat = |z: f32| [[-9.0, -9.0, z], [9.0, -9.0, z], [0.0, 9.0, z]];
+        let up = |z: f32, ulps: u32| f32::from_bits(z.to_bits() + ulps);
+        for pixels in [0.0, 0.1] {
+            let tolerance = Tolerance { pixels, ulps: 10, clipped_ulps: 0 };
+            let fates = |apart: u32| of(ONE, &[flat(0.5), flat(up(0.5, apart))], tolerance).parts;
+            assert_eq!(fates(21), [Fate::Must, Fate::Hidden], "over both");
+            assert_eq!(fates(20), [Fate::May, Fate::May], "at both");
+        }
+    }
+
+    /// A triangle cut by the near plane has its own number.
+    #[test]
+    fn clipped_triangles_are_off_by_more() {
+        let flat = |z: f32| [[-9.0, -9.0, z], [9.0, -9.0, z], [0.0, 9.0, z]];
+        let cut = [[-9.0, -9.0, 0.5], [9.0, -9.0, 0.5], [0.0, 30.0, -0.1]];
+        let fates = |clipped_ulps: u32| {
+            of(ONE, &[cut, flat(0.7)], Tolerance { clipped_ulps, ..Tolerance::EXACT }).parts
+        };
+        assert_eq!(fates(0), [Fate::Must, Fate::Hidden]);
+        assert_eq!(fates(1 << 24), [Fate::May, Fate::May]);
+    }
+
+    /// Without area a triangle may show what is within the tolerance of its sides, at any of its depths.
+    #[test]
+    fn a_line_may_show_what_is_near_it() {
+        let at = |x: f32, y: f32, z: f32| [2.0 * x, -2.0 * y, z];
+        // A quarter pixel to the right of the sample.
+        let line = [at(0.25, -1.0, 0.3), at(0.25, 1.0, 0.5), at(0.25, 0.0, 0.2)];
+        assert_eq!(of(ONE, &[line], within(0.25)).parts, [Fate::May]);
+        assert_eq!(of(ONE, &[line], within(0.25 - 1.0 / 1024.0)).parts, [Fate::Hidden]);
+        assert_eq!(of(ONE, &[line], Tolerance::EXACT).parts, [Fate::Hidden]);
+        let flat = |z: f32| [[-9.0, -9.0, z], [9.0, -9.0, z], [0.0, 9.0, z]];
+        let before = |z: f32| of(ONE, &[line, flat(z)], within(0.3)).parts;
+        assert_eq!(before(0.21), [Fate::May, Fate::May], "its nearest is before");
+        assert_eq!(before(0.19), [Fate::Hidden, Fate::Must], "all of it is behind");
+    }
+
+    /// Depth at the far plane loses against a cleared sample.
+    #[test]
+    fn the_far_plane_does_not_show() {
+        let flat = |z: f32| [[-9.0, -9.0, z], [9.0, -9.0, z], [0.0, 9.0, z]];
+        assert_eq!(of(ONE, &[flat(1.0)], Tolerance::EXACT).parts, [Fate::Hidden]);
+        assert_eq!(of(ONE, &[flat(1.0_f32.next_down())], Tolerance::EXACT).parts, [Fate::Must]);
+    }
+
+    #[test]
+    fn distances_to_a_segment() {
+        let vertex = |x: i32, y: i32| WindowVertex { x, y, z: 0.0 };
+        let (a, b) = (vertex(2, 1), vertex(8, 9));
+        for (point, expected) in [
+            ([5, 5], 0.0),
+            ([1, 8], 5.0),
+            ([9, 2], 5.0),
+            ([11, 13], 5.0),
+            ([-1, -3], 5.0),
+            ([8, 9], 0.0),
+            ([2, 1], 0.0),
+        ] {
+            assert!((distance(a, b, point) - expected).abs() < 1e-12, "{point:?}");
+            assert!((distance(b, a, point) - expected).abs() < 1e-12, "{point:?}");
+        }
+        assert_eq!(distance(a, a, [5, 5]), 5.0);
+    }
+}

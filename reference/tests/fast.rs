@@ -276,6 +276,34 @@ fn edges_too_uneven_for_f32_stay_in_range() {
     }
 }
 
+/// What the renderer does in all for a picture of many patches, some of them hidden, outside, cut or
+/// large. A change that makes it work more must show here; the bench `instructions` has the rest.
+#[test]
+fn the_work_of_a_picture_is_known() {
+    let bumps: Vec<f32> = (0..89).map(|i| (i * 31 % 89) as f32 / 89.0).collect();
+    let (positions, triangles) = patch(70, &bumps);
+    let ranks: Vec<u32> = (0..triangles.len() as u32).collect();
+    let mesh = Mesh::new(&positions, &triangles, &ranks);
+    let matrix = |i: usize, order: DepthOrder| {
+        let [a, b, c] = [7, 11, 13].map(|step| (i * step % 17) as f32 / 17.0 - 0.5);
+        let scale = if i == 20 { 4.0 } else { 1.5 + c };
+        ordered(perspective(scale, [a * 16.0, b * 12.0, -5.0 - 13.0 * c], a + b), order)
+    };
+    for order in [DepthOrder::Forward, DepthOrder::Reversed] {
+        let instance = |i: usize| Instance::new(&mesh, 0, matrix(i, order), Faces::Both);
+        let instances: Vec<Instance<'_>> = (0..30).map(instance).collect();
+        for level in SimdLevel::available().into_iter().filter(|&l| l != SimdLevel::Scalar) {
+            let mut image = Image::ordered(Viewport { width: 400, height: 300 }, order);
+            let work = fast::render(&mut image, &instances, Options { level, skip_hidden: true });
+            assert_eq!(
+                format!("{work:?}"),
+                "Work { units: 60, units_hidden: 11, clusters_outside: 2641, clusters_narrow: 1046, clusters_wide: 3, clusters: 1089, clusters_hidden: 42, triangles: 87200 }",
+                "{order:?} {level}"
+            );
+        }
+    }
+}
+
 /// What is hidden is left out, and what was left out is counted alike on any number of threads.
 #[test]
 fn hidden_clusters_are_left_out() {

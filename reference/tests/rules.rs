@@ -234,6 +234,8 @@ proptest! {
         prop_assert!(image == other);
         let one = draw(m, &positions, &triangles[..1], &ranks[..1]);
         prop_assert_eq!(naive::count(&image, &one), fast::count(&image, &one));
+        prop_assert_eq!(fast::any(&image, &one), fast::count(&image, &one) > 0);
+        prop_assert!(image.bounds_hold());
     }
 }
 
@@ -295,6 +297,41 @@ fn reversed_depth_is_a_reversed_device() {
         assert_eq!(image.draw_index(sample).map(device_depth), Some(nearest));
         assert!(image.any_rectangle([15, 8], [16, 9], -nearest));
         assert!(!image.any_rectangle([15, 8], [16, 9], (-nearest).next_up()));
+    }
+}
+
+/// Rectangles over several regions, against samples looked at one by one.
+#[test]
+fn rectangles_count_over_regions() {
+    let viewport = Viewport { width: 301, height: 270 };
+    for order in [DepthOrder::Forward, DepthOrder::Reversed] {
+        let [near, _] = order.range();
+        let mut image = Image::ordered(viewport, order);
+        for i in 0..40_u32 {
+            let [a, b, c] = [7, 11, 13].map(|step| (i * step % 17) as f32 / 8.5 - 1.0);
+            let z = near + 0.1 + (i * 19 % 40) as f32 / 50.0;
+            let p = [[a, b, z], [a + 0.4, b, z], [a, b + 0.5 + c * 0.2, z + 0.05]];
+            naive::draw(&mut image, &draw(IDENTITY, &p, &[[0, 1, 2]], &[i]));
+        }
+        // Fresh bounds, as after a render, and stale ones.
+        for fresh in [false, true] {
+            if fresh {
+                fast::draw(&mut image, &[], fast::Options::default());
+            }
+            for i in 0..400_u32 {
+                let [x, y] = [i * 37 % 301, i * 53 % 270];
+                let max = [x + i * 29 % 200, y + i * 31 % 150];
+                let depth = near + (i * 23 % 100) as f32 / 100.0;
+                let inside = |s: &usize| {
+                    let (column, row) = (*s as u32 % 301, *s as u32 / 301);
+                    (x..max[0]).contains(&column) && (y..max[1]).contains(&row)
+                };
+                let passes = |s: &usize| inside(s) && depth <= image.depth(*s);
+                let plain = (0..image.sample_count()).filter(passes).count() as u64;
+                assert_eq!(image.count_rectangle([x, y], max, depth), plain);
+                assert_eq!(image.any_rectangle([x, y], max, depth), plain > 0);
+            }
+        }
     }
 }
 

@@ -90,6 +90,7 @@ pub use mesh::Mesh;
 
 use crate::draw::Faces;
 use crate::image::{Image, Region};
+use crate::order::{DepthOrder, Forward, Order, Reversed};
 use frame::Frame;
 use narrow::Room;
 use painter::{Plain, Vectors};
@@ -187,35 +188,35 @@ pub fn render(image: &mut Image, instances: &[Instance<'_>], options: Options) -
 const PLAIN_UNITS: usize = 200;
 
 fn paint(image: &mut Image, instances: &[Instance<'_>], options: Options, clears: bool) -> Work {
-    let level = options.level.or_below();
-    let names = frame::names(instances);
-    let Some(level) = level else {
+    match image.order() {
+        DepthOrder::Forward => paint_ordered(Forward, image, instances, options, clears),
+        DepthOrder::Reversed => paint_ordered(Reversed, image, instances, options, clears),
+    }
+}
+
+fn paint_ordered<O: Order>(
+    order: O,
+    image: &mut Image,
+    instances: &[Instance<'_>],
+    options: Options,
+    clears: bool,
+) -> Work {
+    let (names, target) = (frame::names(instances), (image.viewport(), O::ORDER));
+    let Some(level) = options.level.or_below() else {
         if clears {
             image.clear();
         }
         let parts = names.chunks(PLAIN_UNITS).map(|names| {
-            let (frame, work) = Frame::new(
-                None,
-                (image.viewport(), image.order()),
-                instances,
-                names,
-                options.skip_hidden,
-            );
+            let (frame, work) = Frame::new(None, target, instances, names, options.skip_hidden);
             let draw = |keys: &[u64], region: &mut Region<'_>, room: &mut Room| {
-                region::draw(Plain, &frame, keys, region, room)
+                region::draw(Plain(order), &frame, keys, region, room)
             };
             work + each_region(image, &frame, false, draw)
         });
         return parts.fold(Work::default(), Add::add);
     };
-    let (frame, work) = Frame::new(
-        Some(level),
-        (image.viewport(), image.order()),
-        instances,
-        &names,
-        options.skip_hidden,
-    );
-    let draw = |keys: &[u64], region: &mut Region<'_>, room: &mut Room| dispatch!(level, s => region::draw(Vectors(s), &frame, keys, region, room));
+    let (frame, work) = Frame::new(Some(level), target, instances, &names, options.skip_hidden);
+    let draw = |keys: &[u64], region: &mut Region<'_>, room: &mut Room| dispatch!(level, s => region::draw(Vectors(s, order), &frame, keys, region, room));
     work + each_region(image, &frame, clears, draw)
 }
 

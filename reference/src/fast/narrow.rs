@@ -12,7 +12,7 @@ use super::mesh::{CLUSTER_VERTICES, View};
 use super::{Instance, inlined, lookup};
 use crate::draw::Faces;
 use crate::image::{BLOCK, BLOCKS, REGION, Region};
-use crate::order::{DepthOrder, FARTHEST, MAGNITUDE};
+use crate::order::{DepthOrder, FARTHEST, MAGNITUDE, Order};
 
 /// Triangles of a full cluster, rounded up to vectors, and one vector more to write beyond the end.
 const SLOTS: usize = 6 * LANES;
@@ -86,8 +86,14 @@ pub(crate) struct Job<'a> {
 
 /// Draws a cluster whose place is narrow.
 #[inline(always)]
-pub(crate) fn draw<S: Simd>(s: S, job: &Job<'_>, region: &mut Region<'_>, room: &mut Room) {
-    job.transform(s, region.order, room);
+pub(crate) fn draw<S: Simd, O: Order>(
+    s: S,
+    order: O,
+    job: &Job<'_>,
+    region: &mut Region<'_>,
+    room: &mut Room,
+) {
+    job.transform(s, order, room);
     let count = job.triangles;
     lookup::corners(s, &room.snapped, job.view.corners, &mut room.corners);
     // The region's pixels from the cluster's first one.
@@ -100,7 +106,7 @@ pub(crate) fn draw<S: Simd>(s: S, job: &Job<'_>, region: &mut Region<'_>, room: 
     for from in (0..kept).step_by(LANES) {
         let lanes = u64::MAX >> (64 - (kept - from).min(LANES));
         set_up(s, room, from, lanes, job.instance.faces, low, high);
-        written |= job.samples(s, region, room, from);
+        written |= job.samples((s, order), region, room, from);
     }
     if written {
         let at = |pixel: i32, axis: usize| {
@@ -117,9 +123,9 @@ pub(crate) fn draw<S: Simd>(s: S, job: &Job<'_>, region: &mut Region<'_>, room: 
 impl Job<'_> {
     /// The written transform and window rule, sixteen vertices at a time.
     #[inline(always)]
-    fn transform<S: Simd>(&self, s: S, order: DepthOrder, room: &mut Room) {
+    fn transform<S: Simd, O: Order>(&self, s: S, _: O, room: &mut Room) {
         let m = &self.instance.clip_from_object;
-        let [near, far] = order.range();
+        let [near, far] = O::ORDER.range();
         let [half_x, half_y] = self.half;
         for at in (0..self.vertices).step_by(LANES) {
             let [x, y, z]: [f32x16<S>; 3] = three!(axis => {
@@ -162,9 +168,9 @@ impl Job<'_> {
 
     /// Draws the triangles that [`set_up`] has prepared. Whether any sample was reached.
     #[inline(always)]
-    fn samples<S: Simd>(
+    fn samples<S: Simd, O: Order>(
         &self,
-        s: S,
+        (s, order): (S, O),
         region: &mut Region<'_>,
         room: &mut Room,
         from: usize,
@@ -174,7 +180,7 @@ impl Job<'_> {
         while samples != 0 {
             let bit = samples.trailing_zeros() as usize;
             samples &= samples - 1;
-            self.sample(region, room, from, bit % LANES, bit / LANES);
+            self.sample::<O>(region, room, from, bit % LANES, bit / LANES);
         }
         let mut lanes = set_up.larger;
         while lanes != 0 {
@@ -182,14 +188,21 @@ impl Job<'_> {
             lanes &= lanes - 1;
             let triangle = room.kept[3][from + lane] as usize;
             let z = self.depths(room, triangle, set_up.turned >> lane & 1 == 1);
-            self.larger(s, region, set_up, lane, z, self.id(triangle));
+            self.larger((s, order), region, set_up, lane, z, self.id(triangle));
         }
         set_up.tiny | set_up.larger != 0
     }
 
     /// One covered sample: the box's first (0), the one to its right (1), or those below (2, 3).
     #[inline(always)]
-    fn sample(&self, region: &mut Region<'_>, room: &Room, from: usize, lane: usize, which: usize) {
+    fn sample<O: Order>(
+        &self,
+        region: &mut Region<'_>,
+        room: &Room,
+        from: usize,
+        lane: usize,
+        which: usize,
+    ) {
         let set_up = &room.set_up;
         let triangle = room.kept[3][from + lane] as usize;
         let z = self.depths(room, triangle, set_up.turned >> lane & 1 == 1);
@@ -197,7 +210,7 @@ impl Job<'_> {
         let column = set_up.first[0][lane] + right + self.min[0] - region.origin[0];
         let row = set_up.first[1][lane] + down + self.min[1] - region.origin[1];
         let stored = &mut region.words[row as usize * REGION + column as usize];
-        if nearest(region.order, z) <= *stored {
+        if nearest(O::ORDER, z) <= *stored {
             let e = three!(i => {
                 set_up.edges[i][lane] + right * set_up.right[i][lane] + down * set_up.down[i][lane]
             });
@@ -205,16 +218,16 @@ impl Job<'_> {
             let [e0, e1, e2] = three!(i => f64::from(e[i]));
             let [z0, z1, z2] = three!(i => f64::from(z[i]));
             let depth = (((e0 * z0 + e1 * z1) + e2 * z2) / area) as f32;
-            let word = i64::from(region.order.key(depth)) << 32 | i64::from(self.id(triangle));
+            let word = i64::from(O::ORDER.key(depth)) << 32 | i64::from(self.id(triangle));
             *stored = (*stored).min(word);
         }
     }
 
     /// One triangle, eight columns of a row at a time.
     #[inline(always)]
-    fn larger<S: Simd>(
+    fn larger<S: Simd, O: Order>(
         &self,
-        s: S,
+        (s, order): (S, O),
         region: &mut Region<'_>,
         set_up: &SetUp,
         lane: usize,
@@ -232,7 +245,7 @@ impl Job<'_> {
         let bias = three!(i => set_up.bias[i][lane]);
         let at = three!(i => set_up.edges[i][lane]);
         let area = f64::from(at[0] + at[1] + at[2]);
-        let nearest = i64x8::splat(s, nearest(region.order, z));
+        let nearest = i64x8::splat(s, nearest(O::ORDER, z));
         let z = three!(i => f64::from(z[i]));
         let lane32 = i32x8::load_array(s, [0, 1, 2, 3, 4, 5, 6, 7]);
         let lane64 = f64x8::load_array(s, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
@@ -254,7 +267,7 @@ impl Job<'_> {
                 let reached = covered & nearest.simd_le(stored).to_bitmask();
                 if reached != 0 {
                     let e = three!(i => along64[i] + f64::from(e[i]));
-                    let word = depth_words(s, region.order, e, z, area, id);
+                    let word = depth_words(s, order, e, z, area, id);
                     let lower = mask64x8::from_bitmask(s, reached).select(word.min(stored), stored);
                     lower.store_slice(words);
                 }
@@ -273,9 +286,9 @@ pub(crate) fn nearest(order: DepthOrder, z: [f32; 3]) -> i64 {
 
 /// The written depth at eight samples from their exact edge values, as words with `id`.
 #[inline(always)]
-pub(crate) fn depth_words<S: Simd>(
+pub(crate) fn depth_words<S: Simd, O: Order>(
     s: S,
-    order: DepthOrder,
+    _: O,
     e: [f64x8<S>; 3],
     z: [f64; 3],
     area: f64,
@@ -283,7 +296,7 @@ pub(crate) fn depth_words<S: Simd>(
 ) -> i64x8<S> {
     let depth = ((e[0] * z[0] + e[1] * z[1]) + e[2] * z[2]) / area;
     let bits: u32x16<S> = s.narrow_f64x8(depth, depth).bitcast();
-    let keys = match order {
+    let keys = match O::ORDER {
         DepthOrder::Forward => bits,
         DepthOrder::Reversed => u32x16::splat(s, FARTHEST) - (bits & MAGNITUDE),
     };

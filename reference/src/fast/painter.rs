@@ -7,10 +7,14 @@ use fearless_simd::{Simd, i64x8};
 use super::narrow::{self, Job, Room, nearest};
 use super::wide::{self, Edge, Wide};
 use crate::image::{BLOCK, BLOCKS, REGION, Region};
+use crate::order::Order;
 use crate::window::depth;
 
 /// What draws into a region.
 pub(crate) trait Painter: Copy {
+    /// Which way depth runs.
+    type Order: Order;
+
     /// Draws a wide triangle into one block (column and row); whether it reached any sample.
     fn block(
         self,
@@ -29,9 +33,11 @@ pub(crate) trait Painter: Copy {
 
 /// Many samples or triangles at a time.
 #[derive(Clone, Copy)]
-pub(crate) struct Vectors<S>(pub(crate) S);
+pub(crate) struct Vectors<S, O>(pub(crate) S, pub(crate) O);
 
-impl<S: Simd> Painter for Vectors<S> {
+impl<S: Simd, O: Order> Painter for Vectors<S, O> {
+    type Order = O;
+
     #[inline(always)]
     fn block(
         self,
@@ -40,12 +46,12 @@ impl<S: Simd> Painter for Vectors<S> {
         edges: &[Edge; 3],
         block: [usize; 2],
     ) -> bool {
-        wide::samples(self.0, wide, region, edges, block)
+        wide::samples((self.0, self.1), wide, region, edges, block)
     }
 
     #[inline(always)]
     fn cluster(self, job: &Job<'_>, region: &mut Region<'_>, room: &mut Room) {
-        narrow::draw(self.0, job, region, room);
+        narrow::draw(self.0, self.1, job, region, room);
     }
 
     #[inline(always)]
@@ -63,9 +69,11 @@ impl<S: Simd> Painter for Vectors<S> {
 
 /// One sample at a time. Its frames hold no narrow clusters.
 #[derive(Clone, Copy)]
-pub(crate) struct Plain;
+pub(crate) struct Plain<O>(pub(crate) O);
 
-impl Painter for Plain {
+impl<O: Order> Painter for Plain<O> {
+    type Order = O;
+
     fn block(
         self,
         wide: &Wide,
@@ -74,8 +82,7 @@ impl Painter for Plain {
         [column, row]: [usize; 2],
     ) -> bool {
         let z = wide.triangle.v.map(|v| v.z);
-        let order = region.order;
-        let nearest = nearest(order, z);
+        let nearest = nearest(O::ORDER, z);
         let mut any = false;
         for i in 0..BLOCK * BLOCK {
             let [x, y] = [column * BLOCK + i % BLOCK, row * BLOCK + i / BLOCK];
@@ -83,7 +90,7 @@ impl Painter for Plain {
             let stored = &mut region.words[y * REGION + x];
             if edges.iter().all(|edge| edge.at(at) >= 0) && nearest <= *stored {
                 let e = [0, 1, 2].map(|i| edges[i].exact_at(at));
-                let key = order.key(depth(e, z, wide.triangle.area));
+                let key = O::ORDER.key(depth(e, z, wide.triangle.area));
                 *stored = (*stored).min(i64::from(key) << 32 | i64::from(wide.id));
                 any = true;
             }

@@ -6,6 +6,7 @@ use super::narrow::{Job, Room};
 use super::painter::Painter;
 use super::{Work, wide};
 use crate::image::{BLOCK, BLOCKS, REGION, Region};
+use crate::order::Order;
 
 /// Marks a triangle among the items of a unit; without it an item is a cluster.
 const WIDE: u32 = 1 << 31;
@@ -31,7 +32,7 @@ pub(crate) fn draw<P: Painter>(
             continue;
         }
         items.clear();
-        list(frame, unit, region, &mut items);
+        list::<P>(frame, unit, region, &mut items);
         items.sort_unstable();
         for &item in &items {
             let near = (item >> 32) as u32;
@@ -73,7 +74,7 @@ pub(crate) fn draw<P: Painter>(
 }
 
 /// Clusters and triangles of the unit that may show in the region, by nearest depth.
-fn list(frame: &Frame<'_>, unit: &Unit, region: &Region<'_>, items: &mut Vec<u64>) {
+fn list<P: Painter>(frame: &Frame<'_>, unit: &Unit, region: &Region<'_>, items: &mut Vec<u64>) {
     let meets = |min: [i16; 2], max: [i16; 2]| {
         (0..2).all(|axis| {
             i32::from(max[axis]) >= region.origin[axis]
@@ -89,7 +90,7 @@ fn list(frame: &Frame<'_>, unit: &Unit, region: &Region<'_>, items: &mut Vec<u64
     }
     for (i, wide) in frame.wide(unit).iter().enumerate() {
         if meets(wide.min, wide.max) {
-            items.push(u64::from(wide.near(region.order)) << 32 | u64::from(WIDE) | i as u64);
+            items.push(u64::from(wide.near(P::Order::ORDER)) << 32 | u64::from(WIDE) | i as u64);
         }
     }
 }

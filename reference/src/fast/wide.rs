@@ -6,7 +6,7 @@ use fearless_simd::{Simd, f64x8, i32x8, i64x8, mask64x8};
 use super::narrow::{depth_words, nearest};
 use super::painter::Painter;
 use crate::image::{BLOCK, BLOCKS, REGION, Region, Viewport};
-use crate::order::DepthOrder;
+use crate::order::{DepthOrder, Order};
 use crate::window::{Oriented, SUBPIXELS, edge, top_left};
 
 /// A triangle that covers at least the box of a sample.
@@ -148,7 +148,7 @@ pub(crate) fn draw<P: Painter>(painter: P, wide: &Wide, region: &mut Region<'_>)
     let (y0, y1) = (block(1, wide.min[1]), block(1, wide.max[1]));
     let edges = three!(i => Edge::new(triangle, i, region.origin));
     let plane = Plane::new(triangle, &edges);
-    let near = wide.near(region.order);
+    let near = wide.near(P::Order::ORDER);
     let rise = three!(i => edges[i].rise());
     for row in y0..=y1 {
         for column in x0..=x1 {
@@ -158,7 +158,7 @@ pub(crate) fn draw<P: Painter>(painter: P, wide: &Wide, region: &mut Region<'_>)
                 continue;
             }
             let far = region.far[row * BLOCKS + column];
-            if near > far || plane.hidden(region.order, place, far) {
+            if near > far || plane.hidden(P::Order::ORDER, place, far) {
                 continue;
             }
             if painter.block(wide, region, &edges, [column, row]) {
@@ -170,8 +170,8 @@ pub(crate) fn draw<P: Painter>(painter: P, wide: &Wide, region: &mut Region<'_>)
 
 /// Draws the triangle into one block; whether it reached any sample.
 #[inline(always)]
-pub(crate) fn samples<S: Simd>(
-    s: S,
+pub(crate) fn samples<S: Simd, O: Order>(
+    (s, order): (S, O),
     wide: &Wide,
     region: &mut Region<'_>,
     edges: &[Edge; 3],
@@ -187,7 +187,7 @@ pub(crate) fn samples<S: Simd>(
     });
     let down = three!(i => edges[i].down as i32);
     let z = three!(i => wide.triangle.v[i].z);
-    let nearest = i64x8::splat(s, nearest(region.order, z));
+    let nearest = i64x8::splat(s, nearest(O::ORDER, z));
     let z = three!(i => f64::from(z[i]));
     let area = wide.triangle.area as f64;
     let along = three!(i => lane64 * (SUBPIXELS * edges[i].right) as f64);
@@ -202,7 +202,7 @@ pub(crate) fn samples<S: Simd>(
             if reached != 0 {
                 let at = [place[0], place[1] + line as i64];
                 let e = three!(i => along[i] + edges[i].exact_at(at));
-                let word = depth_words(s, region.order, e, z, area, wide.id);
+                let word = depth_words(s, order, e, z, area, wide.id);
                 let lower = mask64x8::from_bitmask(s, reached).select(word.min(stored), stored);
                 lower.store_slice(words);
                 any = true;
