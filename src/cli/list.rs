@@ -5,7 +5,7 @@ use crate::cull::CullerKind;
 use crate::index::INDEXES;
 use crate::oracle::CostModel;
 use crate::oracle::wgpu::{Gpu, NO_DEVICE};
-use crate::scene::generate::{GENERATORS, HARD};
+use crate::scene::generate::{GENERATORS, HARD, SWARM};
 
 pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<u8, CliError> {
     let out = &mut streams.out;
@@ -15,7 +15,8 @@ pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<
         lines.iter().try_for_each(|(name, summary)| writeln!(out, "  {name:<wide$} {summary}"))
     };
     let pair = |name: &str, summary: &str| (name.to_owned(), summary.to_owned());
-    section("scenes", GENERATORS.iter().map(|g| pair(g.name, g.summary)).collect())?;
+    let large = GENERATORS.iter().chain([&SWARM]);
+    section("scenes", large.map(|g| pair(g.name, g.summary)).collect())?;
     section("hard scenes", HARD.iter().map(|g| pair(g.name, g.summary)).collect())?;
     section("cullers", cullers.iter().map(|c| pair(c.name, c.summary)).collect())?;
     let oracles = [

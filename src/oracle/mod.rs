@@ -18,6 +18,7 @@ mod maxima;
 mod proxy_mesh;
 mod residency;
 mod sim;
+mod simulated;
 #[cfg_attr(not(feature = "hardware"), path = "no_wgpu.rs")]
 pub mod wgpu;
 
@@ -38,6 +39,7 @@ pub use hierarchical_z::HierarchicalZ;
 use proxy_mesh::{box_proxy_triangles, hull_proxy_triangles, rectangle_triangles};
 pub use residency::{Memory, MemoryKnobs, Residency, Step, least_budget, mesh_bytes};
 pub use sim::{Sim, part_draw, part_instance};
+pub use simulated::{Clock, Latency, Misbehaviour, Schedule, Simulated, WATCHDOG_NS};
 
 /// What an oracle is told at the start of a frame.
 #[derive(Clone, Copy, Debug)]

@@ -21,6 +21,7 @@ mod oracle;
 mod partition;
 mod proxies;
 mod readers;
+mod simulated;
 mod snapshots;
 mod tidy;
 mod tolerance;

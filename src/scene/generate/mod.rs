@@ -9,6 +9,7 @@ mod powerplant;
 mod rooms;
 mod shape;
 mod soup;
+mod swarm;
 
 use std::path::PathBuf;
 
@@ -16,6 +17,7 @@ use super::{DepthOrder, LEAF_TRIANGLES, Scene, SceneError, Viewport, file};
 
 pub use hard::HARD;
 pub use shape::blob;
+pub use swarm::SWARM;
 
 /// What a user may choose; `None` leaves it to the generator or the scene file.
 #[derive(Clone, Debug, Default)]
@@ -166,15 +168,20 @@ pub const GENERATORS: &[Generator] = &[
     },
 ];
 
+/// Every generator there is.
+pub fn all() -> impl Iterator<Item = &'static Generator> {
+    GENERATORS.iter().chain(HARD).chain(std::iter::once(&SWARM))
+}
+
 /// Builds the scene called `name`.
 ///
 /// # Errors
 /// [`SceneError::Unknown`] for a name that is not in [`GENERATORS`], [`SceneError::Knob`] for a knob
 /// out of range, and what the import says where a model is asked for.
 pub fn build(name: &str, knobs: &Knobs) -> Result<Scene, SceneError> {
-    let Some(generator) = GENERATORS.iter().chain(HARD).find(|g| g.name == name) else {
+    let Some(generator) = all().find(|g| g.name == name) else {
         let names: Vec<&str> = GENERATORS.iter().map(|g| g.name).collect();
-        let known = format!("{} and hard/…", names.join(", "));
+        let known = format!("{}, swarm and hard/…", names.join(", "));
         return Err(SceneError::Unknown { name: name.to_owned(), known });
     };
     let mut chosen = knobs.chosen(generator)?;
@@ -201,7 +208,7 @@ pub fn matching(pattern: &str) -> Result<Vec<String>, SceneError> {
     let matches = |name: &str| {
         name.len() >= head.len() + tail.len() && name.starts_with(head) && name.ends_with(tail)
     };
-    let names = GENERATORS.iter().chain(HARD).map(|g| g.name);
+    let names = all().map(|g| g.name);
     let found: Vec<String> = names.filter(|name| matches(name)).map(str::to_owned).collect();
     if found.is_empty() {
         return Err(SceneError::NoneMatches { pattern: pattern.to_owned() });
