@@ -39,3 +39,4 @@ pub mod part;
 pub mod report;
 pub mod run;
 pub mod scene;
+pub mod stress;

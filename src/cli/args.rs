@@ -8,6 +8,7 @@ use plainsight_reference::fast::{Options, SimdLevel};
 use super::export::ExportArgs;
 use super::faults::FaultsArgs;
 use super::judge::JudgeArgs;
+use super::stress::StressArgs;
 use super::why::WhyArgs;
 use crate::cull::ProxyKind;
 use crate::oracle::{MIB, MemoryKnobs};
@@ -50,6 +51,8 @@ pub(super) enum Verb {
     Why(WhyArgs),
     /// Put the gate itself on trial: every seeded fault must be caught.
     Faults(FaultsArgs),
+    /// Run worlds by the thousand, each picked by its seed, each judged by every check.
+    Stress(StressArgs),
     /// List scenes, cullers, oracles, indexes and devices.
     List,
 }

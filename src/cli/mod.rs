@@ -13,6 +13,7 @@ mod picture;
 mod progress;
 mod replay;
 mod run;
+mod stress;
 mod why;
 
 use std::ffi::OsString;
@@ -110,6 +111,7 @@ pub fn main(
         args::Verb::Judge(args) => judge::judge(&args, &mut streams),
         args::Verb::Why(args) => why::why(&args, cullers, &mut streams),
         args::Verb::Faults(args) => faults::faults(&args, &mut streams),
+        args::Verb::Stress(args) => stress::stress(&args, cullers, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),
     };
     done.unwrap_or_else(|error| {
@@ -139,6 +141,13 @@ impl OutFile {
         let partial = path.with_file_name(name);
         let file = std::fs::File::create(&partial).map_err(write)?;
         Ok(Self { path: path.to_owned(), partial, file: Some(file) })
+    }
+
+    /// Adds a line to what [`OutFile::finish`] will leave.
+    fn line(&mut self, line: &str) -> Result<(), CliError> {
+        let file = self.file.as_mut().expect("a file is finished once");
+        writeln!(file, "{line}")
+            .map_err(|source| CliError::Write { path: self.path.display().to_string(), source })
     }
 
     fn finish(mut self, bytes: &[u8]) -> Result<(), CliError> {

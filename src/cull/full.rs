@@ -32,7 +32,9 @@ use super::layers::next_layer;
 use super::opened::{NO_PARENT, OpenedNodes};
 use super::postponement::scatter;
 use super::scenery::{Appearance, NodeHistory};
-use super::{Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, View, group};
+use super::{
+    Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, Situation, View, group,
+};
 use crate::index::NodeId;
 use crate::oracle::{OracleError, Proxy};
 
@@ -229,6 +231,9 @@ impl<R: HistoryRules> Full<R> {
             let (proxy, depth) = match self.scenery.appearance(view, item) {
                 Appearance::Nowhere => continue,
                 Appearance::Certain => {
+                    let boxed = self.scenery.clip_box(view, item).is_some();
+                    let why = if boxed { Situation::Unprojectable } else { Situation::SticksOut };
+                    pen.reached(why);
                     self.open(view, pen, item, parent, true);
                     continue;
                 }
@@ -247,6 +252,9 @@ impl<R: HistoryRules> Full<R> {
                 let place = self.open(view, pen, item, parent, false);
                 self.frame.due.push(Due { item, proxy, place });
             } else if R::POSTPONED_SHOWS || !self.scenery.is_part(item) {
+                if self.scenery.is_part(item) {
+                    pen.reached(Situation::DrawnOnTrust);
+                }
                 self.open(view, pen, item, parent, true);
             }
         }
@@ -351,6 +359,7 @@ impl<R: HistoryRules> Full<R> {
                 self.seen(view, part.item);
                 self.frame.opened.show(part.place);
             } else {
+                pen.reached(Situation::PostponedHidden);
                 self.hidden(view, part.item);
             }
         }
@@ -389,6 +398,7 @@ impl<R: HistoryRules> Full<R> {
     /// Walks what shows among `nodes`, of which at least one does, or asks further.
     fn some_show(&mut self, view: &View<'_>, pen: &mut Pen<'_>, mut nodes: Vec<Candidate>) {
         if nodes.len() > 1 {
+            pen.reached(Situation::GroupSplit);
             if self.knobs.after_group == AfterGroup::AskAgain {
                 let alone = |node| Group { nodes: vec![node], ..Group::default() };
                 self.frame.groups.extend(nodes.into_iter().map(alone));
@@ -404,6 +414,9 @@ impl<R: HistoryRules> Full<R> {
             }
         }
         for node in nodes {
+            if node.chance.is_some() {
+                pen.reached(Situation::HiddenShows);
+            }
             self.seen(view, node.item);
             self.open(view, pen, node.item, node.parent, true);
             self.walk(view, pen);
@@ -411,7 +424,7 @@ impl<R: HistoryRules> Full<R> {
     }
 
     /// Pulls visibility up: what was opened and shows nothing counts as hidden from the next frame on.
-    fn pull_up(&mut self, view: &View<'_>) {
+    fn pull_up(&mut self, view: &View<'_>, pen: &mut Pen<'_>) {
         for opened in self.frame.opened.iter() {
             let slot = self.scenery.slot(opened.item);
             let history = &mut self.history[slot];
@@ -424,6 +437,7 @@ impl<R: HistoryRules> Full<R> {
                 // not asked about in vain in every other frame.
                 history.visible_after = view.frame + 1;
             } else {
+                pen.reached(Situation::PulledUp);
                 history.hidden_after = view.frame + 1;
                 history.hidden_frames = 1;
             }
@@ -438,13 +452,14 @@ impl<R: HistoryRules> Culler for Full<R> {
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
         self.scenery.begin_frame(view, &mut self.history);
+        self.scenery.note_update(pen);
         self.frame = Frame::default();
         self.frame.stack.push((Item::Scene(NodeId(0)), NO_PARENT));
         self.walk(view, pen);
         while !self.frame.settled() {
             self.batch(view, pen)?;
         }
-        self.pull_up(view);
+        self.pull_up(view, pen);
         Ok(())
     }
 

@@ -17,6 +17,7 @@ mod per_view;
 mod postponement;
 mod scenery;
 mod simple;
+mod situation;
 mod view;
 mod view_frustum;
 
@@ -33,11 +34,12 @@ pub use draw_all::DrawAll;
 pub use full::{AfterGroup, Full, FullKnobs};
 pub use full_waits::{FullWaits, FullWaitsKnobs};
 pub use journal::{Journal, Question};
-pub use pen::{Counts, Pen};
+pub use pen::{Counts, Finished, Pen};
 pub use per_view::PerView;
 pub use postponement::Postponement;
 pub use scenery::{Appearance, Item, NodeHistory, Scenery, SceneryKnobs, Weight};
 pub use simple::Simple;
+pub use situation::{Situation, Situations};
 pub use view::{ObjectView, View};
 pub use view_frustum::ViewFrustum;
 

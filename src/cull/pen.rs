@@ -1,7 +1,7 @@
 //! The pen: what a culler draws and asks with. It hands everything on to the oracle and keeps the
 //! record that the trace is made of.
 
-use super::{Item, Journal, Question};
+use super::{Item, Journal, Question, Situation, Situations};
 use crate::oracle::{Amounts, Answer, Oracle, OracleError, Proxy, QueryId};
 use crate::part::{PartId, Partition};
 
@@ -47,7 +47,23 @@ pub struct Pen<'a> {
     already: Vec<bool>,
     counts: Counts,
     events_hash: u64,
+    situations: Situations,
+    /// Questions of the batch that are about several proxies.
+    several: Vec<QueryId>,
     journal: Option<&'a mut Journal>,
+}
+
+/// A frame as it was drawn.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The parts in drawing order, each once.
+    pub drawn: Vec<PartId>,
+    /// What it cost.
+    pub counts: Counts,
+    /// Hash of every draw, question and answer in order.
+    pub events_hash: u64,
+    /// What the culler got into.
+    pub situations: Situations,
 }
 
 impl<'a> Pen<'a> {
@@ -60,6 +76,8 @@ impl<'a> Pen<'a> {
             already: vec![false; partition.part_count() as usize],
             counts: Counts::default(),
             events_hash: 0xcbf2_9ce4_8422_2325,
+            situations: Situations::default(),
+            several: Vec::new(),
             journal: None,
         }
     }
@@ -68,6 +86,11 @@ impl<'a> Pen<'a> {
     #[must_use]
     pub fn writing(self, journal: &'a mut Journal) -> Self {
         Self { journal: Some(journal), ..self }
+    }
+
+    /// Notes that the culler is in a situation.
+    pub(super) fn reached(&mut self, situation: Situation) {
+        self.situations.insert(situation);
     }
 
     /// Says that a node is walked into; see [`Journal`].
@@ -109,6 +132,9 @@ impl<'a> Pen<'a> {
         self.counts.queries += 1;
         self.counts.proxies += proxies.len() as u64;
         let query = self.oracle.ask(proxies);
+        if proxies.len() > 1 {
+            self.several.push(query);
+        }
         if let Some(journal) = &mut self.journal {
             let (items, proxies) = (items.into_iter().collect(), proxies.to_vec());
             let after_opened = journal.opened.len();
@@ -145,6 +171,13 @@ impl<'a> Pen<'a> {
         self.oracle.collect(answers)?;
         for answer in &answers[before..] {
             self.counts.visible_answers += u64::from(answer.visible);
+            self.situations.insert(match answer.visible {
+                true => Situation::AnsweredVisible,
+                false => Situation::AnsweredHidden,
+            });
+            if !answer.visible && self.several.binary_search(&answer.query).is_ok() {
+                self.situations.insert(Situation::SeveralHidden);
+            }
             self.note(4, u64::from(answer.query.0) << 1 | u64::from(answer.visible));
             let question = self
                 .journal
@@ -157,15 +190,15 @@ impl<'a> Pen<'a> {
         Ok(())
     }
 
-    /// Ends the frame: the parts drawn in drawing order, the counts, and a hash of every draw,
-    /// question and answer in order.
+    /// Ends the frame.
     ///
     /// # Errors
     /// What the oracle said to the last batch.
-    pub fn finish(self) -> Result<(Vec<PartId>, Counts, u64), OracleError> {
+    pub fn finish(self) -> Result<Finished, OracleError> {
         self.oracle.submit()?;
         self.oracle.collect(&mut Vec::new())?;
-        Ok((self.drawn, self.counts, self.events_hash))
+        let Self { drawn, counts, events_hash, situations, .. } = self;
+        Ok(Finished { drawn, counts, events_hash, situations })
     }
 
     /// FNV-1a over whole words.

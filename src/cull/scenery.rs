@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use super::{CullerSetup, Pen, ProxyKind, View};
+use super::{CullerSetup, Pen, ProxyKind, Situation, View};
 use crate::index::{Index, NodeId};
 use crate::math::{self, Aabb, ClipBox, ClipError, Outline, PixelRectangle, Projection};
 use crate::oracle::Proxy;
@@ -147,6 +147,16 @@ impl Scenery {
             Item::Scene(node) => self.object_slots + node.0,
             Item::Object(object, node) => self.first_slot[object.0 as usize] + node,
         }) as usize
+    }
+
+    /// Notes what became of the scene tree in this frame.
+    pub(super) fn note_update(&self, pen: &mut Pen<'_>) {
+        if !self.index.rebuilt().is_empty() {
+            pen.reached(Situation::Rebuilt);
+        }
+        if self.index.crossed_root() {
+            pen.reached(Situation::CrossedRoot);
+        }
     }
 
     /// Relinks what moved, renews the bounds of inner nodes, and makes `history` fit: as many entries

@@ -65,6 +65,11 @@ pub trait Index {
         &[]
     }
 
+    /// Whether the latest update took an object from one side of the root to the other.
+    fn crossed_root(&self) -> bool {
+        false
+    }
+
     /// Every node in use, parents before children.
     fn top_down(&self) -> &[NodeId];
 

@@ -71,6 +71,8 @@ pub struct TwoLevelBsp {
     moved_in: u32,
     /// Whether anything moved since the last reconstruction.
     stale: bool,
+    /// Whether the latest update took an object across the root.
+    crossed_root: bool,
 }
 
 impl TwoLevelBsp {
@@ -90,6 +92,7 @@ impl TwoLevelBsp {
             updates: 0,
             moved_in: 0,
             stale: false,
+            crossed_root: false,
         };
         let all: Vec<u32> = (0..entries.len() as u32).collect();
         let root = tree.node_for(space, None);
@@ -118,6 +121,16 @@ impl TwoLevelBsp {
         }
         self.nodes.push(node);
         NodeId(self.nodes.len() as u32 - 1)
+    }
+
+    /// The child of the root that `node` is in; `None` for the root itself.
+    fn below_root(&self, node: NodeId) -> Option<NodeId> {
+        let mut below = node;
+        let mut parent = self.nodes[node.0 as usize].parent?;
+        while let Some(above) = self.nodes[parent.0 as usize].parent {
+            (below, parent) = (parent, above);
+        }
+        Some(below)
     }
 
     /// Parts the leaf `node`, which is to hold `inside`.
@@ -346,6 +359,7 @@ impl Index for TwoLevelBsp {
     fn update(&mut self, moves: &[Move]) {
         self.updates += 1;
         self.rebuilt.clear();
+        self.crossed_root = false;
         if !moves.is_empty() {
             (self.moved_in, self.stale) = (self.updates, true);
         }
@@ -360,6 +374,10 @@ impl Index for TwoLevelBsp {
             self.touch(old);
             // Unlinking needs the old box, to know whether the object had escaped.
             if node != old || node == NodeId(0) {
+                self.crossed_root |= match [old, node].map(|node| self.below_root(node)) {
+                    [Some(from), Some(to)] => from != to,
+                    _ => false,
+                };
                 self.unlink(change.object);
                 self.bounds[change.object.0 as usize] = change.bounds;
                 self.link(change.object, node);
@@ -373,6 +391,10 @@ impl Index for TwoLevelBsp {
             self.reconstruct();
         }
         self.tighten();
+    }
+
+    fn crossed_root(&self) -> bool {
+        self.crossed_root
     }
 
     fn rebuilt(&self) -> &[NodeId] {

@@ -236,7 +236,12 @@ pub trait Oracle {
         None
     }
 
-    /// Clears depth to 1.0 and forgets all questions.
+    /// What its virtual clock says, where it has one.
+    fn clock(&self) -> Option<Clock> {
+        None
+    }
+
+    /// Clears depth to the far plane's and forgets all questions.
     ///
     /// # Errors
     /// Where the device is lost.

@@ -120,12 +120,6 @@ impl Simulated {
         }
     }
 
-    /// What the clock says.
-    #[must_use]
-    pub fn clock(&self) -> Clock {
-        self.clock
-    }
-
     fn still_there(&self) -> Result<(), OracleError> {
         if self.lost {
             return Err(OracleError::Lost("the simulated device went away".to_owned()));
@@ -152,6 +146,10 @@ impl Oracle for Simulated {
 
     fn memory(&self) -> Option<Memory> {
         self.sim.memory()
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock)
     }
 
     fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {

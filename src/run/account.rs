@@ -121,7 +121,7 @@ pub fn account(
         oracle.begin_frame(&frame)?;
         let mut pen = Pen::new(oracle, &world.partition).writing(&mut journal);
         culler.frame(&state.view(world), &mut pen)?;
-        let (drawn, ..) = pen.finish()?;
+        let drawn = pen.finish()?.drawn;
         if !tick() {
             return Err(RunError::Interrupted);
         }

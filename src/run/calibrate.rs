@@ -14,7 +14,7 @@
 use std::time::Instant;
 
 use super::{FrameState, Moment, RunError, World};
-use crate::cull::{Culler, CullerSetup, Pen, ProxyKind, ViewFrustum};
+use crate::cull::{Culler, CullerSetup, Finished, Pen, ProxyKind, ViewFrustum};
 use crate::index::INDEXES;
 use crate::oracle::{
     Always, Answer, CostModel, FrameView, Measurement, Oracle, OracleError, Proxy,
@@ -146,7 +146,7 @@ fn parts_in_view(world: &World) -> Vec<(u32, Vec<PartId>)> {
         let state = FrameState::at(world, Moment { frame: t, view: 0 });
         let mut pen = Pen::new(&mut oracle, &world.partition);
         let drawn = culler.frame(&state.view(world), &mut pen).and_then(|()| pen.finish());
-        let (parts, ..) = drawn.expect("this oracle never fails");
+        let parts = drawn.expect("this oracle never fails").drawn;
         if chosen.contains(&t) {
             views.push((t, parts));
         }
@@ -337,7 +337,7 @@ fn run_once(
             Step::RoundTrip => pen.round_trip(&mut answers)?,
         }
     }
-    let (drawn, counts, _) = pen.finish()?;
+    let Finished { drawn, counts, .. } = pen.finish()?;
     // A clock may be too coarse to see an empty frame on a simulated device.
     let ns = start.elapsed().as_nanos().max(1) as f64;
     Ok(Measurement { work: counts.amounts(drawn.len() as u64), ns })

@@ -10,7 +10,7 @@ use super::{
     DeviceImages, FrameRecord, FrameState, FrameTrace, HASH_START, Moment, Trace, Truth, World,
     fold,
 };
-use crate::cull::{Counts, Culler, Pen};
+use crate::cull::{Counts, Culler, Finished, Pen};
 use crate::oracle::{FrameView, Oracle, OracleError, ReadBack};
 use crate::part::PartId;
 
@@ -206,14 +206,14 @@ fn shoot(
     oracle.begin_frame(&frame_view(state))?;
     let mut pen = Pen::new(oracle, &world.partition);
     culler.frame(&state.view(world), &mut pen)?;
-    let (drawn, counts, events_hash) = pen.finish()?;
+    let Finished { drawn, counts, events_hash, situations } = pen.finish()?;
     let wall_ns = start.elapsed().as_nanos() as u64;
     if cfg!(debug_assertions)
         && let Err(broken) = culler.check()
     {
         panic!("{} broke its invariants in {}: {broken}", culler.name(), state.moment);
     }
-    let memory = oracle.memory();
+    let (memory, clock) = (oracle.memory(), oracle.clock());
     let own = oracle.read_back()?;
     let words = |image: &ReadBack| {
         image.depth.iter().fold(HASH_START, |hash, depth| fold(hash, u64::from(depth.to_bits())))
@@ -228,6 +228,8 @@ fn shoot(
         counts,
         memory,
         events_hash,
+        situations,
+        clock,
         truth_hash,
         image_hash,
         wall_ns,

@@ -6,7 +6,7 @@ use std::cell::OnceCell;
 use super::lane::truth_facts;
 use super::{FrameRecord, FrameState, FrameTrace, HASH_START, LaneInfo, Moment, Observer, Trace};
 use super::{Truth, World, fold};
-use crate::cull::Counts;
+use crate::cull::{Counts, Situations};
 use crate::part::PartId;
 
 /// Has `observer` look at every view of frames `0..frames` with the parts that `says` of it; a part that is
@@ -43,6 +43,8 @@ pub fn told<E>(
             counts,
             memory: None,
             events_hash,
+            situations: Situations::default(),
+            clock: None,
             truth_hash,
             image_hash: 0,
             wall_ns: 0,

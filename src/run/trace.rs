@@ -6,8 +6,8 @@ use std::fmt;
 use plainsight_reference::Fates;
 
 use super::{FrameState, HASH_START, LaneInfo, Truth, World, fates_of_parts, fold};
-use crate::cull::Counts;
-use crate::oracle::{Amounts, Memory, ReadBack};
+use crate::cull::{Counts, Situations};
+use crate::oracle::{Amounts, Clock, Memory, ReadBack};
 use crate::part::PartId;
 
 /// Which view of which frame; reads "frame 3", or "frame 3 view 1" where it is not the first.
@@ -87,6 +87,10 @@ pub struct FrameTrace {
     pub memory: Option<Memory>,
     /// Hash of every draw, question and answer in order.
     pub events_hash: u64,
+    /// What the culler got into; in no hash.
+    pub situations: Situations,
+    /// The device's clock after the frame, where it has one; in no hash.
+    pub clock: Option<Clock>,
     /// Hash of the truth's image.
     pub truth_hash: u64,
     /// Hash of the depth that the culler's own draws left; 0 where no image is kept.

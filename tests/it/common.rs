@@ -6,7 +6,7 @@ use plainsight::check::Gate;
 use plainsight::cull::{CullerKind, CullerSetup, PerView, ProxyKind};
 use plainsight::index::IndexKind;
 use plainsight::oracle::wgpu::{Gpu, GpuStage, Hardware};
-use plainsight::oracle::{Always, CostModel, HierarchicalZ, Oracle, Questions, Sim};
+use plainsight::oracle::{Always, CostModel, HierarchicalZ, Oracle, Questions, Sim, Stage};
 use plainsight::part::PartitionKnobs;
 use plainsight::run::{Lane, LaneInfo, Repeat, Trace, World, run};
 use plainsight::scene::Viewport;
@@ -42,8 +42,13 @@ pub(crate) fn swiftshader() -> &'static Arc<Gpu> {
 
 /// The hardware oracle of a device.
 pub(crate) fn hardware(gpu: &Arc<Gpu>, world: &World) -> Box<dyn Oracle> {
-    let stage = GpuStage::new(gpu, &world.stage()).unwrap();
-    Box::new(Hardware::new(&stage, Questions::Queries).unwrap())
+    hardware_of(gpu, &world.stage(), Questions::Queries)
+}
+
+/// An oracle of a device that asks so.
+pub(crate) fn hardware_of(gpu: &Arc<Gpu>, stage: &Stage, questions: Questions) -> Box<dyn Oracle> {
+    let stage = GpuStage::new(gpu, stage).unwrap();
+    Box::new(Hardware::new(&stage, questions).unwrap())
 }
 
 /// A world small enough for debug builds.

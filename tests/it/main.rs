@@ -23,6 +23,7 @@ mod proxies;
 mod readers;
 mod simulated;
 mod snapshots;
+mod stress;
 mod tidy;
 mod tolerance;
 mod why;

@@ -1,11 +1,14 @@
 //! Cut meshes: nothing lost, nothing doubled, ids stable, trees sound.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::DVec3;
 use plainsight::math::Aabb;
-use plainsight::part::{Crossing, ObjectId, PartedMesh, Partition, PartitionKnobs};
+use plainsight::part::{Crossing, ObjectId, PartId, PartedMesh, Partition, PartitionKnobs};
 use plainsight::run::{World, partition_difference};
+use plainsight::scene::generate::{Knobs, build};
+use plainsight::scene::{Mesh, Object, Placement, Scene, Stream};
 
 use crate::common::{SCENES, leaf_triangles, world};
 
@@ -123,8 +126,7 @@ fn the_cut_does_not_depend_on_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let knobs = PartitionKnobs { leaf_triangles: 100, ..PartitionKnobs::default() };
         let partition = pool.install(|| Partition::new(&world.scene, knobs));
-        let of =
-            |mesh: &std::sync::Arc<PartedMesh>| (mesh.triangles.clone(), mesh.positions.clone());
+        let of = |mesh: &Arc<PartedMesh>| (mesh.triangles.clone(), mesh.positions.clone());
         partition.meshes().iter().map(of).collect::<Vec<_>>()
     };
     assert!(cut(1) == cut(3));
@@ -132,6 +134,27 @@ fn the_cut_does_not_depend_on_threads() {
 
 /// Whole triangles: none is added, each stands in one part, the uncut picture comes out bit for bit,
 /// and trees and leaves are as sound, but for planes that no longer part the boxes.
+/// Triangles as large as their mesh part badly: the cut ends in time, and parts stay above the limit.
+#[test]
+fn a_mesh_that_does_not_part_is_left_in_time() {
+    let mut stream = Stream::new(1, "large triangles");
+    let mut positions = Vec::new();
+    let mut triangles = Vec::new();
+    for first in (0..900).step_by(3) {
+        positions.extend([0; 3].map(|_| [0; 3].map(|_| stream.range(-0.5, 0.5) as f32)));
+        triangles.push([first, first + 1, first + 2]);
+    }
+    let mesh = Mesh::new("large", positions, triangles).unwrap();
+    let knobs = PartitionKnobs { leaf_triangles: 7, ..PartitionKnobs::default() };
+    let nothing = build("hard/nothing", &Knobs::default()).unwrap();
+    let object = Object { mesh: 0, placement: Placement::IDENTITY };
+    let scene = Scene { meshes: vec![Arc::new(mesh)], objects: vec![object], ..nothing };
+    let partition = Partition::new(&scene, knobs);
+    let pieces: u32 =
+        (0..partition.part_count()).map(|p| partition.part(PartId(p)).triangle_count).sum();
+    assert!((2000..3000).contains(&pieces), "{pieces} pieces of 300 triangles");
+}
+
 #[test]
 fn whole_triangles_stay_whole() {
     for name in SCENES {

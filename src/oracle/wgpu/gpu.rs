@@ -1,10 +1,12 @@
 //! The device: chosen by name, opened once, shared by everything that draws.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use plainsight_reference::Tolerance;
 
+use super::stage::Drawing;
 use crate::oracle::OracleError;
+use crate::scene::DepthOrder;
 
 /// Said where no Vulkan device is found.
 pub const NO_DEVICE: &str = "no Vulkan device found; install Mesa's lavapipe (Debian, Ubuntu: apt-get \
@@ -16,6 +18,8 @@ pub struct Gpu {
     pub(super) queue: wgpu::Queue,
     name: String,
     tolerance: Tolerance,
+    /// Pipelines for forward and for reversed depth, made when a scene first needs them.
+    drawing: [OnceLock<Arc<Drawing>>; 2],
     /// The first thing the device complained about.
     trouble: Arc<Mutex<Option<String>>>,
 }
@@ -128,7 +132,14 @@ impl Gpu {
             }
         });
         let (name, tolerance) = (describe(chosen), tolerance(chosen));
-        Ok(Arc::new(Self { device, queue, name, tolerance, trouble }))
+        let drawing = [OnceLock::new(), OnceLock::new()];
+        Ok(Arc::new(Self { device, queue, name, tolerance, drawing, trouble }))
+    }
+
+    /// What drawing takes on this device.
+    pub(super) fn drawing(&self, order: DepthOrder) -> Arc<Drawing> {
+        let made = || Arc::new(Drawing::new(&self.device, order));
+        Arc::clone(self.drawing[usize::from(order == DepthOrder::Reversed)].get_or_init(made))
     }
 
     /// The adapter's name and driver.

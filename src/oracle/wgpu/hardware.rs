@@ -389,7 +389,7 @@ impl Hardware {
         if !run.is_empty() {
             let buffers = (&slot.proxies, &slot.resolved);
             let depth = &self.images.depth_view;
-            let (gpu, pipelines) = (&self.stage.gpu, &self.stage.pyramid);
+            let (gpu, pipelines) = (&self.stage.gpu, &self.stage.drawing.pyramid);
             pyramid.encode(gpu, pipelines, encoder, depth, buffers, run);
         }
         from + count
@@ -443,7 +443,7 @@ impl Hardware {
                     let (object, local) = partition.locate(part);
                     if drawing != Some(object) {
                         let mesh = self.parts(partition.mesh_index(object));
-                        pass.set_pipeline(&self.stage.draw);
+                        pass.set_pipeline(&self.stage.drawing.draw);
                         pass.set_immediates(0, bytemuck::bytes_of(&self.drawn_object(object)));
                         pass.set_vertex_buffer(0, mesh.vertices.slice(..));
                         pass.set_index_buffer(mesh.by_part.slice(..), wgpu::IndexFormat::Uint32);
@@ -461,7 +461,7 @@ impl Hardware {
                         return place;
                     }
                     drawing = None;
-                    pass.set_pipeline(&self.stage.ask);
+                    pass.set_pipeline(&self.stage.drawing.ask);
                     pass.set_vertex_buffer(0, slot.proxies.slice(..));
                     pass.begin_occlusion_query(queries as u32);
                     pass.draw(first_vertex..end_vertex, 0..1);

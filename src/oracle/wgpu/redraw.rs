@@ -62,7 +62,7 @@ pub(super) fn encode_redraw(
         ),
         ..Default::default()
     });
-    pass.set_pipeline(&stage.draw_ids);
+    pass.set_pipeline(&stage.drawing.draw_ids);
     for (object, run, whole) in runs {
         let mesh = &stage.meshes[partition.mesh_index(object) as usize];
         pass.set_vertex_buffer(0, mesh.parts.vertices.slice(..));

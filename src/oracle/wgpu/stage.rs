@@ -74,11 +74,9 @@ impl GpuParts {
     }
 }
 
-/// Geometry and pipelines of one scene.
-pub struct GpuStage {
-    pub(super) gpu: Arc<Gpu>,
-    pub(super) stage: Stage,
-    pub(super) meshes: Vec<GpuMesh>,
+/// What drawing and asking take, one set a device and depth order: drivers compile it for a tenth of a
+/// second and longer.
+pub(super) struct Drawing {
     /// Less, writes depth.
     pub(super) draw: wgpu::RenderPipeline,
     /// Less, writes depth and part ids.
@@ -87,6 +85,27 @@ pub struct GpuStage {
     pub(super) ask: wgpu::RenderPipeline,
     /// Answers by maxima of depth.
     pub(super) pyramid: pyramid::Pipelines,
+}
+
+impl Drawing {
+    /// Compiled anew.
+    pub(super) fn new(device: &wgpu::Device, order: DepthOrder) -> Self {
+        let pipelines = Pipelines::new(device, order);
+        Self {
+            draw: pipelines.part(None),
+            draw_ids: pipelines.part(Some(IDS)),
+            ask: pipelines.proxy(),
+            pyramid: pyramid::Pipelines::new(device, order),
+        }
+    }
+}
+
+/// Geometry and pipelines of one scene.
+pub struct GpuStage {
+    pub(super) gpu: Arc<Gpu>,
+    pub(super) stage: Stage,
+    pub(super) meshes: Vec<GpuMesh>,
+    pub(super) drawing: Arc<Drawing>,
 }
 
 impl GpuStage {
@@ -98,7 +117,7 @@ impl GpuStage {
 }
 
 impl GpuStage {
-    /// Uploads every mesh once and builds the pipelines.
+    /// Uploads every mesh once.
     ///
     /// # Errors
     /// [`OracleError::Lost`] where the device refuses.
@@ -110,15 +129,11 @@ impl GpuStage {
             return Err(OracleError::Lost(what));
         }
         let meshes = stage.partition.meshes().iter().map(|mesh| upload(device, mesh)).collect();
-        let pipelines = Pipelines::new(device, stage.depth);
         let made = Arc::new(Self {
             gpu: Arc::clone(gpu),
             stage: stage.clone(),
             meshes,
-            draw: pipelines.part(None),
-            draw_ids: pipelines.part(Some(IDS)),
-            ask: pipelines.proxy(),
-            pyramid: pyramid::Pipelines::new(device, stage.depth),
+            drawing: gpu.drawing(stage.depth),
         });
         gpu.wait(None)?;
         Ok(made)

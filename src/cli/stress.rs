@@ -1,0 +1,347 @@
+//! `stress`: worlds by the thousand, each picked by its seed, each judged by every check.
+
+use std::io::BufRead;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::args::quoted;
+use super::progress::progress_bar;
+use super::run::{Oracles, catch_interrupt, interrupted, pick_cullers};
+use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use crate::cull::CullerKind;
+use crate::oracle::{Oracle, OracleError, Questions, Stage};
+use crate::run::RunError;
+use crate::stress::{Choice, Outcome, Shard, Tally, VERSION, judged, seed_of};
+
+/// Seeds of a sweep where nothing is said.
+const DEFAULT_SEEDS: (u64, u64) = (0, 1000);
+/// Worlds between two looks at the clock and at Ctrl-C; they run on all cores.
+const CHUNK: usize = 64;
+/// Failing seeds said in full.
+const SAID_FAILURES: usize = 5;
+
+#[derive(Args, Clone)]
+pub(super) struct StressArgs {
+    /// Seeds from A to B, B left out.
+    #[arg(long, value_name = "A..B", value_parser = range, conflicts_with = "seed")]
+    seeds: Option<(u64, u64)>,
+    /// One seed: a number, or a commit's hash of 40 digits.
+    #[arg(long, value_name = "SEED", value_parser = seed_of)]
+    seed: Option<u64>,
+    /// This machine's share of the seeds, i from 0 (default: what GitLab, CircleCI, Buildkite, Azure, Slurm
+    /// arrays and Kubernetes' indexed jobs say, else all).
+    #[arg(long, value_name = "i/n", conflicts_with = "seed")]
+    shard: Option<Shard>,
+    /// Start no world after this time: 90s, 10m, 2h.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    budget: Option<Duration>,
+    /// Cullers to pick from (default: all).
+    #[arg(long, value_name = "CULLER", num_args = 1.., value_delimiter = ',')]
+    culler: Vec<String>,
+    /// Real devices to pick from: hardware, pyramid, read-back (default: none; worlds run on sim,
+    /// hierarchical-z or the simulated device).
+    #[arg(long, value_name = "ORACLE", num_args = 1.., value_delimiter = ',')]
+    oracle: Vec<String>,
+    /// Part of the name of the Vulkan adapter to use.
+    #[arg(long)]
+    adapter: Option<String>,
+    /// Fail as well where some situation was never reached.
+    #[arg(long)]
+    every_probe: bool,
+    /// Add up the lines of these files, that sweeps wrote with --out, and run nothing.
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["seeds", "seed", "shard", "budget", "out"])]
+    merge: Vec<PathBuf>,
+    /// One JSON object a world on standard output in place of the summary.
+    #[arg(long)]
+    json: bool,
+    /// Also write the JSON lines to this file.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+fn range(text: &str) -> Result<(u64, u64), String> {
+    let ends = text.split_once("..").and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    match ends {
+        Some((from, to)) if from < to => Ok((from, to)),
+        _ => Err("write A..B, A below B, as in 0..1000".to_owned()),
+    }
+}
+
+fn duration(text: &str) -> Result<Duration, String> {
+    let wrong = || "write a number with s, m or h, as in 90s, 10m or 2h".to_owned();
+    let (number, unit) =
+        text.split_at(text.len() - text.chars().next_back().map_or(0, char::len_utf8));
+    let factor = match unit {
+        "s" => 1.0,
+        "m" => 60.0,
+        "h" => 3600.0,
+        _ => return Err(wrong()),
+    };
+    let number: f64 = number.parse().map_err(|_| wrong())?;
+    Duration::try_from_secs_f64(number * factor).map_err(|_| wrong())
+}
+
+/// What ended a sweep.
+#[derive(Clone, Copy, PartialEq)]
+enum End {
+    /// All seeds were run.
+    Seeds,
+    /// The budget.
+    Time,
+    /// Ctrl-C.
+    Interrupted,
+}
+
+/// A sweep over seeds.
+struct Sweep<'a> {
+    args: &'a StressArgs,
+    cullers: Vec<CullerKind>,
+    real: Vec<Questions>,
+    oracles: Oracles,
+}
+
+impl Sweep<'_> {
+    /// The world of a seed; a panic in it is a failure like any other.
+    fn world(&self, seed: u64) -> Result<Outcome, RunError> {
+        let choice = Choice::of(seed, &self.cullers, &self.real);
+        let real = |stage: &Stage, questions: Questions| -> Result<Box<dyn Oracle>, OracleError> {
+            self.oracles.stage(stage)?.make(questions.name())
+        };
+        catch_unwind(AssertUnwindSafe(|| judged(&choice, &real))).unwrap_or_else(|panic| {
+            let said = panic
+                .downcast_ref::<String>()
+                .map(String::as_str)
+                .or_else(|| panic.downcast_ref::<&str>().copied())
+                .unwrap_or("without a word");
+            let said = said.lines().next().unwrap_or("");
+            Ok(Outcome::panicked(&choice, said))
+        })
+    }
+
+    fn replay(&self, seed: u64) -> String {
+        let mut line = format!("plainsight stress --seed {seed}");
+        let mut add = |name: &str, values: &[String]| {
+            if !values.is_empty() {
+                line += &format!(" --{name} {}", quoted(&values.join(",")));
+            }
+        };
+        add("culler", &self.args.culler);
+        add("oracle", &self.args.oracle);
+        add("adapter", self.args.adapter.as_slice());
+        line
+    }
+
+    fn line(outcome: &Outcome) -> String {
+        let mut line = serde_json::to_value(outcome).unwrap_or(Value::Null);
+        line["plainsight"] = json!("stress");
+        line["version"] = json!(VERSION);
+        line.to_string()
+    }
+
+    /// Runs the seeds in order, chunk by chunk, until they, the time or the user's patience end.
+    fn run(
+        &self,
+        mut seeds: impl Iterator<Item = u64>,
+        bar: &ProgressBar,
+        each: &mut dyn FnMut(&Outcome) -> Result<(), CliError>,
+    ) -> Result<End, CliError> {
+        let start = Instant::now();
+        loop {
+            if interrupted() {
+                return Ok(End::Interrupted);
+            }
+            if self.args.budget.is_some_and(|budget| start.elapsed() >= budget) {
+                return Ok(End::Time);
+            }
+            // A real device is one: its worlds run one after the other.
+            let size = if self.real.is_empty() { CHUNK } else { 1 };
+            let chunk: Vec<u64> = seeds.by_ref().take(size).collect();
+            if chunk.is_empty() {
+                return Ok(End::Seeds);
+            }
+            let outcomes: Vec<Result<Outcome, RunError>> = match self.real.is_empty() {
+                true => chunk.par_iter().map(|&seed| self.world(seed)).collect(),
+                false => chunk.iter().map(|&seed| self.world(seed)).collect(),
+            };
+            for outcome in outcomes {
+                let outcome = outcome?;
+                let replay = self.replay(outcome.seed);
+                each(&Outcome { replay, ..outcome })?;
+                bar.inc(1);
+            }
+        }
+    }
+}
+
+/// Adds up the lines of files.
+fn merged(files: &[PathBuf]) -> Result<Tally, CliError> {
+    let mut tally = Tally::default();
+    for path in files {
+        let refuse = |place: &str, what: String| {
+            CliError::Usage(format!("{}{place}: {what}", path.display()))
+        };
+        let file = std::fs::File::open(path).map_err(|error| refuse("", error.to_string()))?;
+        for (number, line) in (1..).zip(std::io::BufReader::new(file).lines()) {
+            let place = format!(" line {number}");
+            let line = line.map_err(|error| refuse(&place, error.to_string()))?;
+            let value: Value = serde_json::from_str(&line).map_err(|_| {
+                refuse(&place, "is no JSON; give files that stress --out wrote".to_owned())
+            })?;
+            if value["plainsight"] != json!("stress") || value["version"] != json!(VERSION) {
+                let what = format!(
+                    "is no line of stress, version {VERSION}; give files that stress --out wrote"
+                );
+                return Err(refuse(&place, what));
+            }
+            let outcome: Outcome =
+                serde_json::from_value(value).map_err(|error| refuse(&place, error.to_string()))?;
+            tally.add(&outcome);
+        }
+    }
+    Ok(tally)
+}
+
+pub(super) fn stress(
+    args: &StressArgs,
+    cullers: &[CullerKind],
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
+    if !args.merge.is_empty() {
+        let tally = merged(&args.merge)?;
+        return conclude(args, &tally, streams.out);
+    }
+    let mut out = args.out.as_deref().map(OutFile::create).transpose()?;
+    Oracles::known(&args.oracle)?;
+    let real: Vec<Questions> = args.oracle.iter().filter_map(|name| Questions::of(name)).collect();
+    if real.len() < args.oracle.len() {
+        return Err(CliError::Usage(
+            "--oracle names real devices here: hardware, pyramid, read-back; without it worlds run on the others".to_owned(),
+        ));
+    }
+    let cullers = match args.culler.is_empty() {
+        true => cullers.to_vec(),
+        false => pick_cullers(&args.culler, cullers)?,
+    };
+    // No real device is opened where none is asked for.
+    let names = if real.is_empty() { vec!["sim".to_owned()] } else { args.oracle.clone() };
+    let adapter = args.adapter.as_deref().filter(|_| !real.is_empty());
+    let oracles = Oracles::open(&names, adapter, streams)?;
+    let shard = match args.shard {
+        Some(shard) => shard,
+        None => Shard::of_environment(|name| std::env::var(name).ok())
+            .map_err(|error| CliError::Usage(error.to_string()))?,
+    };
+    let (from, to) = match args.seed {
+        Some(seed) => (seed, seed + 1),
+        None => args.seeds.unwrap_or(DEFAULT_SEEDS),
+    };
+    let shard = if args.seed.is_some() { Shard::WHOLE } else { shard };
+    catch_interrupt();
+    let bar = progress_bar();
+    bar.set_style(
+        ProgressStyle::with_template(
+            "{msg:<20} {bar:30} {human_pos}/{human_len} worlds, {per_sec}, {eta} left",
+        )
+        .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    bar.set_length((to - from).div_ceil(shard.count));
+    let sweep = Sweep { args, cullers, real, oracles };
+    let (mut tally, start) = (Tally::default(), Instant::now());
+    let ran = sweep.run(shard.seeds(from, to), &bar, &mut |outcome| {
+        tally.add(outcome);
+        if !outcome.failures.is_empty() {
+            bar.set_message(format!("{} FAILED", tally.failed));
+        }
+        let line = Sweep::line(outcome);
+        if args.json {
+            bar.suspend(|| writeln!(streams.out, "{line}"))?;
+        }
+        if let Some(out) = &mut out {
+            out.line(&line)?;
+        }
+        Ok(())
+    });
+    bar.finish_and_clear();
+    let end = ran?;
+    let seconds = start.elapsed().as_secs_f64();
+    let to_talk = &mut *streams.talk;
+    let sink: &mut dyn std::io::Write = if args.json { to_talk } else { &mut *streams.out };
+    let rest = match end {
+        End::Seeds => "",
+        End::Time => "; the time was up before all seeds were run",
+        End::Interrupted => "; interrupted",
+    };
+    writeln!(
+        sink,
+        "seeds {from}..{to}, shard {shard}: {} worlds in {seconds:.1} s, {:.0} a second{rest}",
+        tally.worlds,
+        tally.worlds as f64 / seconds.max(1e-9)
+    )?;
+    if args.seed.is_some()
+        && let Some(only) = &tally.worst_excess
+    {
+        writeln!(sink, "seed {}: {}; {}", only.seed, only.scene, only.options)?;
+    }
+    let code = conclude(args, &tally, sink)?;
+    if let Some(out) = out {
+        out.finish(b"")?;
+    }
+    Ok(if end == End::Interrupted { super::EXIT_INTERRUPTED } else { code })
+}
+
+/// What a sweep came to.
+fn conclude(args: &StressArgs, tally: &Tally, to: &mut dyn std::io::Write) -> Result<u8, CliError> {
+    writeln!(
+        to,
+        "{} worlds, {} frames, {} worlds run twice",
+        tally.worlds, tally.shots, tally.repeated
+    )?;
+    writeln!(to, "situations, with the worlds that reached them:")?;
+    // Of a single world what it did not reach says nothing.
+    let said = |count: u64| count > 0 || tally.worlds > 1;
+    for (probe, count) in tally.probes().into_iter().filter(|&(_, count)| said(count)) {
+        let rare = if count == 0 && probe.is_rare() { " (rare)" } else { "" };
+        writeln!(to, "  {count:>9}  {probe}{rare}")?;
+    }
+    let mut worst = |what: &str, outcome: &Option<Outcome>, figure: &dyn Fn(&Outcome) -> f64| {
+        outcome.as_ref().map_or(Ok(()), |o| {
+            writeln!(
+                to,
+                "{what}: seed {}, {:.1} a frame: {}; {}",
+                o.seed,
+                figure(o),
+                o.scene,
+                o.options
+            )
+        })
+    };
+    let a_frame = |sum: u64, o: &Outcome| sum as f64 / f64::from(o.shots.max(1));
+    worst("most parts in vain", &tally.worst_excess, &|o| {
+        a_frame(o.drawn.saturating_sub(o.visible), o)
+    })?;
+    worst("most questions", &tally.most_queries, &|o| a_frame(o.queries, o))?;
+    for failure in tally.failures.iter().take(SAID_FAILURES) {
+        writeln!(to, "FAILED: seed {}: {}; {}", failure.seed, failure.scene, failure.options)?;
+        failure.failures.iter().try_for_each(|line| writeln!(to, "  {line}"))?;
+        writeln!(to, "  replay: {}", failure.replay)?;
+    }
+    let never = tally.never_reached();
+    if args.every_probe {
+        never.iter().try_for_each(|probe| writeln!(to, "NEVER REACHED: {probe}"))?;
+    }
+    let held = tally.failed == 0 && (never.is_empty() || !args.every_probe);
+    let word = if held { "held" } else { "failed" };
+    writeln!(
+        to,
+        "verdict: {word} ({} of {} worlds held)",
+        tally.worlds - tally.failed,
+        tally.worlds
+    )?;
+    Ok(if held { EXIT_HELD } else { EXIT_FAILED })
+}

@@ -1,0 +1,210 @@
+//! What a seed picks beside the scene: the picture, the cut, the culler and what it stands on, the device.
+
+use std::fmt;
+
+use crate::cull::{CullerKind, ProxyKind};
+use crate::index::{INDEXES, IndexKind};
+use crate::oracle::{CostModel, Latency, Questions, Schedule};
+use crate::part::{Crossing, PartitionKnobs};
+use crate::scene::generate::{Knobs, SWARM, build};
+use crate::scene::{DepthOrder, Scene, SceneError, Stream, Viewport};
+
+/// What answers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Device {
+    /// The reference, exact and at once.
+    Sim,
+    /// A pyramid of its depth.
+    HierarchicalZ,
+    /// The simulated device under a schedule.
+    Simulated(Schedule),
+    /// A real device.
+    Real(Questions),
+}
+
+/// Everything that a seed picks but the scene itself.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// The seed, also the scene's.
+    pub seed: u64,
+    /// Pixels.
+    pub viewport: Viewport,
+    /// Which way depth runs.
+    pub depth: DepthOrder,
+    /// Frames of the run.
+    pub frames: u32,
+    /// The cut.
+    pub partition: PartitionKnobs,
+    /// The culler.
+    pub culler: CullerKind,
+    /// The index under it.
+    pub index: IndexKind,
+    /// What it asks about.
+    pub proxy: ProxyKind,
+    /// What work costs, for cullers that weigh it and for the virtual clock.
+    pub cost: CostModel,
+    /// What answers.
+    pub device: Device,
+}
+
+/// The seed that a user wrote: a number, or the first sixteen digits of a commit's hash of forty, so that a
+/// commit can name its own worlds.
+///
+/// # Errors
+/// Where it is neither.
+pub fn seed_of(text: &str) -> Result<u64, String> {
+    let is_hash = text.len() == 40 && text.bytes().all(|b| b.is_ascii_hexdigit());
+    let seed = if is_hash { u64::from_str_radix(&text[..16], 16) } else { text.parse() };
+    seed.map_err(|_| format!("'{text}' is no seed: write a number or a commit's hash of 40 digits"))
+}
+
+fn pick<T: Copy>(stream: &mut Stream, from: &[T]) -> T {
+    from[stream.below(from.len() as u32) as usize]
+}
+
+impl Choice {
+    /// What `seed` picks among `cullers`, of which there is at least one; on real devices by each of `real`,
+    /// if any are given, in the place of simulated ones.
+    ///
+    /// # Panics
+    /// Without cullers.
+    #[must_use]
+    pub fn of(seed: u64, cullers: &[CullerKind], real: &[Questions]) -> Self {
+        // A stream a concern, so that one more culler does not move the picture.
+        let mut picture = Stream::new(seed, "picture");
+        let usual = SWARM.viewport;
+        let sizes = [
+            [usual.width, usual.height],
+            [usual.width, usual.height],
+            [usual.width, usual.height],
+            [97, 61],
+            [257, 33],
+            [31, 200],
+            [1, 1],
+        ];
+        let [width, height] = pick(&mut picture, &sizes);
+        let depth = match picture.below(4) {
+            0 => DepthOrder::Reversed,
+            _ => DepthOrder::Forward,
+        };
+        let frames = pick(&mut picture, &[SWARM.frames, SWARM.frames, SWARM.frames, 3, 24]);
+        let mut cut = Stream::new(seed, "cut");
+        let partition = PartitionKnobs {
+            leaf_triangles: pick(&mut cut, &[SWARM.leaf_triangles, SWARM.leaf_triangles, 7, 1000]),
+            crossing: if cut.below(4) == 0 { Crossing::Whole } else { Crossing::Split },
+        };
+        let mut culler = Stream::new(seed, "culler");
+        let kind = pick(&mut culler, cullers);
+        let proxy = pick(&mut culler, &[ProxyKind::Rectangle, ProxyKind::Hull, ProxyKind::Box]);
+        let index = pick(&mut Stream::new(seed, "index"), INDEXES);
+        let costs = CostModel::named();
+        let cost = costs[culler.below(costs.len() as u32) as usize].clone();
+        let mut device = Stream::new(seed, "device");
+        let schedule = Schedule {
+            seed,
+            latency: pick(&mut device, &[Latency::Even, Latency::Jittery, Latency::Spiky]),
+            doubt: pick(&mut device, &[0.0, 0.0, 0.05, 0.5, 1.0]),
+            misbehaviour: None,
+        };
+        let device = match device.below(8) {
+            _ if !real.is_empty() => Device::Real(pick(&mut device, real)),
+            0 => Device::Sim,
+            1 => Device::HierarchicalZ,
+            _ => Device::Simulated(schedule),
+        };
+        let viewport = Viewport { width, height };
+        Self { seed, viewport, depth, frames, partition, culler: kind, index, proxy, cost, device }
+    }
+
+    /// The scene.
+    ///
+    /// # Errors
+    /// None that a seed can lead to; what a generator says.
+    pub fn scene(&self) -> Result<Scene, SceneError> {
+        let knobs = Knobs {
+            seed: Some(self.seed),
+            frames: Some(self.frames),
+            viewport: Some(self.viewport),
+            depth: Some(self.depth),
+            ..Knobs::default()
+        };
+        build(SWARM.name, &knobs)
+    }
+}
+
+impl fmt::Display for Choice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Viewport { width, height } = self.viewport;
+        let depth = match self.depth {
+            DepthOrder::Forward => "",
+            DepthOrder::Reversed => ", reversed depth",
+        };
+        let parts = match self.partition.crossing {
+            Crossing::Split => "split",
+            Crossing::Whole => "whole",
+        };
+        let proxy = match self.proxy {
+            ProxyKind::Rectangle => "rectangle",
+            ProxyKind::Hull => "hull",
+            ProxyKind::Box => "box",
+        };
+        write!(
+            f,
+            "{width}x{height}{depth}, {} frames, leaf {} {parts}, {} over {}, {proxy}, cost {}, on ",
+            self.frames,
+            self.partition.leaf_triangles,
+            self.culler.name,
+            self.index.name,
+            self.cost.name
+        )?;
+        match self.device {
+            Device::Sim => f.write_str("sim"),
+            Device::HierarchicalZ => f.write_str("hierarchical-z"),
+            Device::Simulated(Schedule { latency, doubt, .. }) => {
+                let latency = match latency {
+                    Latency::Even => "even",
+                    Latency::Jittery => "jittery",
+                    Latency::Spiky => "spiky",
+                };
+                write!(f, "simulated ({latency} latency, doubt {doubt})")
+            }
+            Device::Real(questions) => f.write_str(questions.name()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cull::CULLERS;
+
+    #[test]
+    fn seeds_are_numbers_or_commits() {
+        assert_eq!(seed_of("7"), Ok(7));
+        assert_eq!(seed_of("0123456789abcdef0123456789abcdef01234567"), Ok(0x0123_4567_89ab_cdef));
+        for bad in ["", "-1", "abc", "0123456789abcdef0123456789abcdef0123456", "1.5"] {
+            assert!(seed_of(bad).unwrap_err().contains("is no seed"), "{bad}");
+        }
+    }
+
+    /// Every culler, index, proxy and device comes up, and what is picked is a function of the seed.
+    #[test]
+    fn every_member_is_picked() {
+        let choices: Vec<Choice> = (0..2000).map(|seed| Choice::of(seed, CULLERS, &[])).collect();
+        let share = |of: &dyn Fn(&Choice) -> bool| choices.iter().filter(|c| of(c)).count();
+        for kind in CULLERS {
+            assert!(share(&|choice| choice.culler.name == kind.name) > 100, "{}", kind.name);
+        }
+        for kind in INDEXES {
+            assert!(share(&|choice| choice.index.name == kind.name) > 100, "{}", kind.name);
+        }
+        assert!(share(&|choice| choice.device == Device::Sim) > 100);
+        assert!(share(&|choice| choice.depth == DepthOrder::Reversed) > 300);
+        assert!(share(&|choice| choice.partition.crossing == Crossing::Whole) > 300);
+        let said = |seed| Choice::of(seed, CULLERS, &[]).to_string();
+        assert_eq!(said(5), said(5));
+        let real = Choice::of(5, CULLERS, &[Questions::Pyramid]);
+        assert_eq!(real.device, Device::Real(Questions::Pyramid));
+        assert_eq!(real.viewport, choices[5].viewport);
+    }
+}

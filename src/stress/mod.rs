@@ -1,0 +1,27 @@
+//! Stress: whole worlds picked by a seed, run and judged by the thousand. A seed decides the scene (the
+//! generator `swarm`), the picture, the cut, the culler with all it stands on, and the device's schedule;
+//! what it picked is said beside it. It must not know reports.
+//!
+//! The idea of a seed that is a whole simulated world, with a schedule of its own, is that of Zhou et al. 2021
+//! (*FoundationDB: A distributed unbundled transactional key value store*, section 4); that of leaving
+//! features out at random is Groce et al. 2012 (*Swarm testing*).
+//!
+//! | file | what |
+//! |---|---|
+//! | `choice` | what a seed picks |
+//! | `world` | one seed's world run and judged |
+//! | `probe` | situations that a sweep should reach |
+//! | `tally` | outcomes added up, from one sweep or from the lines of many |
+//! | `shard` | which seeds are this machine's |
+
+mod choice;
+mod probe;
+mod shard;
+mod tally;
+mod world;
+
+pub use choice::{Choice, Device, seed_of};
+pub use probe::{Probe, Reached};
+pub use shard::{Shard, ShardError};
+pub use tally::{Tally, VERSION};
+pub use world::{MakeReal, Outcome, REPEATED_ONE_IN, judged};

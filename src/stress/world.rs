@@ -1,0 +1,180 @@
+//! One seed's world, run and judged.
+
+use serde::{Deserialize, Serialize};
+
+use super::probe::{Probe, Watch};
+use super::{Choice, Device, Reached};
+use crate::check::Gate;
+use crate::cull::{CullerSetup, PerView};
+use crate::oracle::{HierarchicalZ, Oracle, OracleError, Questions, Sim, Simulated, Stage};
+use crate::run::{
+    FrameRecord, FrameTrace, Lane, LaneInfo, Observer, Repeat, RunError, Trace, World, run,
+};
+use crate::scene::{Lens, Scene};
+
+/// One world in so many is run twice and compared, frame by frame, by a hash of every draw, question and
+/// answer in order.
+pub const REPEATED_ONE_IN: u64 = 20;
+
+/// What became of a seed; a line of JSON, so that sweeps can be merged.
+#[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
+pub struct Outcome {
+    /// The seed.
+    pub seed: u64,
+    /// What it picked.
+    pub options: String,
+    /// What is in the scene.
+    pub scene: String,
+    /// Frames times views.
+    pub shots: u32,
+    /// What failed, a line each; empty where all held.
+    pub failures: Vec<String>,
+    /// Names of the probes that were reached.
+    pub reached: Vec<String>,
+    /// Parts drawn, over all frames.
+    pub drawn: u64,
+    /// Parts that show.
+    pub visible: u64,
+    /// Questions asked.
+    pub queries: u64,
+    /// Virtual nanoseconds by the device's clock, or by the cost model where it has none.
+    pub virtual_ns: u64,
+    /// Whether it was run twice.
+    pub repeated: bool,
+    /// One number for all that must repeat, in hexadecimal digits.
+    pub hash: String,
+    /// The line that runs it again, where one is known.
+    #[serde(default)]
+    pub replay: String,
+}
+
+/// The gate, and who watches for probes.
+#[derive(Default)]
+struct Watched {
+    gate: Gate,
+    watch: Watch,
+}
+
+impl Observer for Watched {
+    fn frame(&mut self, record: &FrameRecord<'_>) {
+        self.gate.frame(record);
+        self.watch.frame(record);
+    }
+
+    fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
+        self.gate.repeated(first, again);
+    }
+}
+
+/// Makes oracles of a real device.
+pub type MakeReal<'a> = dyn Fn(&Stage, Questions) -> Result<Box<dyn Oracle>, OracleError> + 'a;
+
+/// Runs the world of a choice. `real` makes oracles of a real device and is asked only where the choice names
+/// one.
+///
+/// # Errors
+/// What the oracle said. A device that goes away is no failure of a culler.
+///
+/// # Panics
+/// Where a culler's own invariants are broken, in builds with debug assertions.
+pub fn judged(choice: &Choice, real: &MakeReal<'_>) -> Result<Outcome, RunError> {
+    let scene = choice.scene().expect("the swarm has a scene for every seed");
+    let said = summary(&scene);
+    let world = World::new(scene, choice.partition);
+    let stage = world.stage();
+    let oracle: Box<dyn Oracle> = match choice.device {
+        Device::Sim => Box::new(Sim::new(stage)),
+        Device::HierarchicalZ => Box::new(HierarchicalZ::new(stage)),
+        Device::Simulated(schedule) => {
+            Box::new(Simulated::new(stage, choice.cost.clone(), schedule))
+        }
+        Device::Real(questions) => real(&stage, questions)?,
+    };
+    let entries = world.entries();
+    let make = || {
+        (choice.culler.make)(CullerSetup {
+            partition: world.partition.clone(),
+            index: (choice.index.build)(&entries),
+            proxy: choice.proxy,
+            cost: choice.cost.clone(),
+        })
+    };
+    let mut watched = Watched::default();
+    let info = LaneInfo::of(choice.culler.name, oracle.as_ref(), String::new());
+    let culler = Box::new(|| PerView::over(world.views(), make));
+    let lane = Lane { info, culler, oracle, observer: &mut watched, with_bound: false };
+    let repeated = choice.seed.is_multiple_of(REPEATED_ONE_IN);
+    let repeat = if repeated { Repeat::first(choice.frames) } else { Repeat::NONE };
+    let traces = run(&world, choice.frames, repeat, &mut [lane], &mut || true)?;
+    Ok(outcome(choice, said, &traces[0], &mut watched, repeated))
+}
+
+impl Outcome {
+    /// Of a world whose run ended in a panic.
+    #[must_use]
+    pub fn panicked(choice: &Choice, said: &str) -> Self {
+        Self {
+            seed: choice.seed,
+            options: choice.to_string(),
+            scene: choice.scene().map_or_else(|error| error.to_string(), |scene| summary(&scene)),
+            shots: 0,
+            failures: vec![format!("panic: {said}")],
+            reached: Vec::new(),
+            drawn: 0,
+            visible: 0,
+            queries: 0,
+            virtual_ns: 0,
+            repeated: false,
+            hash: String::new(),
+            replay: String::new(),
+        }
+    }
+}
+
+fn outcome(
+    choice: &Choice,
+    scene: String,
+    trace: &Trace,
+    Watched { gate, watch }: &mut Watched,
+    repeated: bool,
+) -> Outcome {
+    let reached: &mut Reached = &mut watch.reached;
+    trace.frames.iter().for_each(|frame| reached.note_situations(frame.situations));
+    let clock = trace.frames.iter().filter_map(|frame| frame.clock).next_back();
+    if let Some(clock) = clock {
+        reached.note(Probe::FalseVisible, clock.false_visible > 0);
+        reached.note(Probe::Overtaken, clock.overtakes > 0);
+    }
+    let modelled = || trace.sum(|frame| choice.cost.frame_total_ns(frame.amounts()));
+    Outcome {
+        seed: choice.seed,
+        options: choice.to_string(),
+        scene,
+        shots: trace.frames.len() as u32,
+        failures: gate.failures(),
+        reached: reached.probes().iter().map(Probe::to_string).collect(),
+        drawn: trace.sum(|frame| u64::from(frame.drawn_parts)),
+        visible: trace.sum(|frame| u64::from(frame.visible_parts)),
+        queries: trace.sum(|frame| frame.counts.queries),
+        virtual_ns: clock.map_or_else(modelled, |clock| clock.now_ns),
+        repeated,
+        hash: format!("{:016x}", trace.hash()),
+        replay: String::new(),
+    }
+}
+
+/// What is in a scene, in a line.
+fn summary(scene: &Scene) -> String {
+    let moving = scene.effects.motion.as_ref().map_or(0, |motion| motion.movers.len());
+    let jumping = scene.effects.teleport.as_ref().map_or(0, |teleport| teleport.jumpers.len());
+    let lens = match scene.cameras[0].lens {
+        Lens::Perspective { fov_y, .. } => format!("{:.0}°", fov_y.to_degrees()),
+        Lens::Orthographic { .. } => "orthographic".to_owned(),
+    };
+    format!(
+        "{} objects, {} triangles, {moving} moving, {jumping} jumping, {lens}, {} views",
+        scene.objects.len(),
+        scene.triangle_count(),
+        scene.cameras.len()
+    )
+}
