@@ -102,7 +102,7 @@ impl World {
     /// For an object that does not exist.
     #[must_use]
     pub fn world_from_object(&self, object: ObjectId, t: u32) -> DMat4 {
-        self.effects.placement(object.0, t).world_from_object()
+        self.effects.placement(object.0, self.scene.start + t).world_from_object()
     }
 
     /// A cleared image of the scene's size and depth order.
@@ -157,7 +157,8 @@ impl FrameState {
     #[must_use]
     pub fn at(world: &World, moment: Moment) -> Self {
         let t = moment.frame;
-        let camera = world.scene.cameras[moment.view as usize].at(t);
+        let tick = world.scene.start + t;
+        let camera = world.scene.cameras[moment.view as usize].at(tick);
         let clip_from_world = camera.clip_from_world(world.scene.viewport, world.scene.depth);
         let objects: Vec<ObjectView> = (0..world.scene.objects.len() as u32)
             .map(|object| {
@@ -174,12 +175,12 @@ impl FrameState {
             .collect();
         let moved = |&object: &u32| {
             let bounds = objects[object as usize].bounds;
-            let jumped = world.effects.jumped(object, t);
+            let jumped = world.effects.jumped(object, tick);
             Move { object: ObjectId(object), bounds, jumped }
         };
         // Things at rest between two moves are not named: boxes tighten about them.
         let differs = |&&object: &&u32| {
-            world.effects.placement(object, t) != world.effects.placement(object, t - 1)
+            world.effects.placement(object, tick) != world.effects.placement(object, tick - 1)
         };
         let moving = if t == 0 { &[] } else { world.effects.moving() };
         let moves = moving.iter().filter(differs).map(moved).collect();

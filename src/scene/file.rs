@@ -7,6 +7,7 @@
 //! seed = 7
 //! scale = 0.5
 //! frames = 10
+//! start = 5                                # tick of the first frame, of inline objects
 //! viewport = [640, 480]
 //! depth = "reversed"                        # or "forward", the default
 //! ```
@@ -18,15 +19,17 @@
 //! positions = [[0,0,0], [1,0,0], [0,1,0]]
 //! triangles = [[0,1,2]]
 //! translation = [0,0,-3]                   # all of these are optional
-//! rotation_y_degrees = 30
+//! rotation_y_degrees = 30                  # or rotation = [x,y,z,w], a unit quaternion
 //! scale = [1,-2,1]
 //! shear = [0.5,0,0]                        # x leans with y, x with z, y with z
 //! reflect = { velocity = [1,0,0], min = [-5,0,0], max = [5,0,0], spin = 0.1 }
+//! # circuit = { corners = [[0,0,0], [9,0,0]], speed = 0.5, start = 2 }    # in the place of reflect
 //! jumps = { offsets = [[0,0,0], [0,9,0]], period = 4 }
 //! [camera_path]
 //! poses = [{ eye = [0,0,5], target = [0,0,0] }]
 //! travel = "jump"                          # or "glide", the default
-//! fov_y_degrees = 60                       # or orthographic_height = 4
+//! fov_y_degrees = 60                       # or fov_y in radians, or orthographic_height = 4
+//! duration = 24                            # frames from the first pose to the last; all, by default
 //! shift = [0.5,0]                          # how far the view direction is off the middle
 //! near = 0.1
 //! far = inf                                # or a number
@@ -37,6 +40,7 @@
 //! far = 10
 //! ```
 
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -51,6 +55,8 @@ use super::{
 
 /// The only version there is.
 const VERSION: u32 = 1;
+/// The latest tick that a scene may begin at: frames after it fit 32 bits.
+const LATEST_START: u32 = 1_000_000_000;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -63,6 +69,8 @@ struct SceneFile {
     #[serde(default)]
     full_size: bool,
     frames: Option<u32>,
+    #[serde(default)]
+    start: u32,
     viewport: Option<[u32; 2]>,
     depth: Option<DepthName>,
     leaf_triangles: Option<u32>,
@@ -98,10 +106,12 @@ struct InlineObject {
     translation: [f64; 3],
     #[serde(default)]
     rotation_y_degrees: f64,
+    rotation: Option<[f64; 4]>,
     scale: Option<[f64; 3]>,
     #[serde(default)]
     shear: [f64; 3],
     reflect: Option<InlineReflect>,
+    circuit: Option<InlineCircuit>,
     jumps: Option<InlineJumps>,
 }
 
@@ -110,6 +120,15 @@ struct InlineObject {
 struct InlineJumps {
     offsets: Vec<[f64; 3]>,
     period: u32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InlineCircuit {
+    corners: Vec<[f64; 3]>,
+    speed: f64,
+    #[serde(default)]
+    start: f64,
 }
 
 #[derive(Deserialize)]
@@ -137,6 +156,8 @@ struct InlinePath {
     #[serde(default)]
     travel: TravelName,
     fov_y_degrees: Option<f64>,
+    fov_y: Option<f64>,
+    duration: Option<u32>,
     #[serde(default)]
     shift: [f64; 2],
     orthographic_height: Option<f64>,
@@ -174,6 +195,9 @@ pub fn parse(text: &str, path: &Path, knobs: &Knobs) -> Result<Scene, SceneError
     }
     if file.leaf_triangles == Some(0) {
         return Err(refuse("leaf_triangles must be at least 1".to_owned()));
+    }
+    if file.start > LATEST_START {
+        return Err(refuse(format!("start must be at most {LATEST_START}")));
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     let camera = file.camera.map(|camera| match camera {
@@ -239,9 +263,21 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
         }
         let mesh = Mesh::new(format!("object {number}"), object.positions, object.triangles);
         meshes.push(Arc::new(mesh.map_err(|error| error.to_string())?));
+        let rotation = match object.rotation {
+            Some(xyzw) => {
+                let rotation = DQuat::from_array(xyzw);
+                if !rotation.is_normalized() || object.rotation_y_degrees != 0.0 {
+                    return Err(format!(
+                        "object {number}: rotation is a unit quaternion x, y, z, w, without rotation_y_degrees"
+                    ));
+                }
+                rotation
+            }
+            None => DQuat::from_rotation_y(object.rotation_y_degrees.to_radians()),
+        };
         let placement = Placement {
             translation: object.translation.into(),
-            rotation: DQuat::from_rotation_y(object.rotation_y_degrees.to_radians()),
+            rotation,
             scale: numbers[1].into(),
             shear: object.shear.into(),
         };
@@ -255,6 +291,20 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
             let way =
                 Way::Reflect { velocity: velocity.into(), min: min.into(), max: max.into(), spin };
             movers.push((number as u32, way));
+        }
+        if let Some(InlineCircuit { corners, speed, start }) = object.circuit {
+            let finite =
+                corners.as_flattened().iter().chain([&speed, &start]).all(|c| c.is_finite());
+            if corners.len() < 2
+                || !finite
+                || movers.last().is_some_and(|(o, _)| *o == number as u32)
+            {
+                return Err(format!(
+                    "object {number}: a circuit has at least two corners, finite numbers, and no reflect beside it"
+                ));
+            }
+            let corners = corners.into_iter().map(DVec3::from).collect();
+            movers.push((number as u32, Way::Circuit { corners, speed, start }));
         }
         if let Some(InlineJumps { offsets, period }) = object.jumps {
             if !offsets.as_flattened().iter().all(|c| c.is_finite()) {
@@ -274,6 +324,7 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
         depth: chosen.depth,
         leaf_triangles: file.leaf_triangles.unwrap_or(chosen.leaf_triangles),
         frames: chosen.frames,
+        start: file.start,
         effects: Effects {
             motion: (!movers.is_empty()).then_some(Motion { movers }),
             teleport: (!jumpers.is_empty()).then_some(Teleport { jumpers }),
@@ -292,13 +343,18 @@ fn camera(place: &str, path: &InlinePath, duration: u32) -> Result<CameraPath, S
     let poses = poses
         .filter(|poses| !poses.is_empty())
         .ok_or(format!("{place}: needs poses whose eye and target are finite and differ"))?;
-    let lens = match (path.fov_y_degrees, path.orthographic_height) {
-        (Some(degrees), None) if degrees > 0.0 && degrees < 180.0 => {
-            Lens::Perspective { fov_y: degrees.to_radians(), shift: path.shift }
+    let fov_y = match (path.fov_y_degrees, path.fov_y) {
+        (Some(degrees), None) if degrees > 0.0 && degrees < 180.0 => Some(degrees.to_radians()),
+        (None, Some(radians)) if radians > 0.0 && radians < PI => Some(radians),
+        (None, None) => None,
+        _ => {
+            return Err(format!(
+                "{place}: fov_y_degrees must be above 0 and below 180, or fov_y in radians below pi"
+            ));
         }
-        (Some(_), None) => {
-            return Err(format!("{place}: fov_y_degrees must be above 0 and below 180"));
-        }
+    };
+    let lens = match (fov_y, path.orthographic_height) {
+        (Some(fov_y), None) => Lens::Perspective { fov_y, shift: path.shift },
         (None, Some(height)) if height > 0.0 && height.is_finite() => Lens::Orthographic { height },
         (None, Some(_)) => {
             return Err(format!("{place}: orthographic_height must be above 0 and finite"));
@@ -315,6 +371,7 @@ fn camera(place: &str, path: &InlinePath, duration: u32) -> Result<CameraPath, S
         let what = "needs 0 < near < far; with fov_y_degrees far may be inf";
         return Err(format!("{place}: {what}"));
     }
+    let duration = path.duration.unwrap_or(duration);
     let travel = match path.travel {
         TravelName::Glide => Travel::Glide,
         TravelName::Jump => Travel::Jump,

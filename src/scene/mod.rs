@@ -10,6 +10,7 @@ pub mod file;
 pub mod generate;
 pub mod import;
 mod stream;
+mod write;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,6 +20,7 @@ pub use plainsight_reference::{DepthOrder, Viewport};
 
 pub use camera::{Camera, CameraPath, CameraPose, Lens, Travel};
 pub use stream::Stream;
+pub use write::to_toml;
 
 /// Most triangles in a part by default.
 pub const LEAF_TRIANGLES: u32 = 3072;
@@ -207,6 +209,8 @@ pub struct Scene {
     pub depth: DepthOrder,
     /// How many frames a run has by default.
     pub frames: u32,
+    /// The tick of frame 0: later than 0 where what went before is of no interest.
+    pub start: u32,
     /// Most triangles in a part where the user says nothing; at least 1.
     pub leaf_triangles: u32,
     /// What moves or changes.

@@ -40,6 +40,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         depth: chosen.depth,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
+        start: 0,
         effects: Effects::default(),
     })
 }

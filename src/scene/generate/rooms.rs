@@ -91,6 +91,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         depth: chosen.depth,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
+        start: 0,
         effects: Effects { motion: Some(Motion { movers }), ..Effects::default() },
     })
 }

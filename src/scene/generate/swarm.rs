@@ -81,6 +81,7 @@ fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         depth: chosen.depth,
         leaf_triangles: chosen.leaf_triangles,
         frames: chosen.frames,
+        start: 0,
         effects,
     })
 }

@@ -162,6 +162,7 @@ impl Site {
             viewport: chosen.viewport,
             depth: chosen.depth,
             frames: chosen.frames,
+            start: 0,
             leaf_triangles: chosen.leaf_triangles,
             effects: Effects {
                 motion: (!movers.is_empty()).then_some(Motion { movers }),
