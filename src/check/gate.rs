@@ -8,7 +8,7 @@ use crate::index::INDEXES;
 use crate::oracle::{CostModel, Oracle, Sim};
 use crate::part::PartitionKnobs;
 use crate::run::{
-    self, FrameRecord, FrameTrace, Lane, LaneInfo, Observer, Repeat, RunError, Trace, World,
+    self, FrameRecord, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World,
 };
 use crate::scene::Scene;
 
@@ -53,6 +53,16 @@ impl Gate {
     #[must_use]
     pub fn held(&self) -> bool {
         self.failures().is_empty()
+    }
+
+    /// When something failed first; the counts' failure has no earlier time than its own frame.
+    #[must_use]
+    pub fn first_failure(&self) -> Option<Moment> {
+        let misses = self.conservative.misses().iter().map(|miss| miss.moment);
+        let images = self.image.differences().iter().chain(self.device_image.differences());
+        let images = images.map(|difference| difference.moment);
+        let others = [self.determinism.first_difference(), self.counts.overcounted()];
+        misses.chain(images).chain(others.into_iter().flatten()).min()
     }
 
     /// Each failure as a line: frame, part, pixel.

@@ -11,7 +11,7 @@ use super::judge::JudgeArgs;
 use super::stress::StressArgs;
 use super::why::WhyArgs;
 use crate::cull::ProxyKind;
-use crate::oracle::{MIB, MemoryKnobs};
+use crate::oracle::{Latency, MIB, MemoryKnobs, Schedule};
 use crate::part::{Crossing, PartitionKnobs};
 use crate::run::CalibrationKnobs;
 use crate::scene::generate::{CameraMode, Knobs};
@@ -114,6 +114,12 @@ pub(super) struct SceneArgs {
     /// h100, or a file that `calibrate` wrote.
     #[arg(long, value_name = "NAME|FILE.toml", default_value = "lavapipe")]
     pub(super) cost: String,
+    /// When the simulated device's answers come.
+    #[arg(long, value_enum, default_value_t = LatencyArg::Even)]
+    pub(super) latency: LatencyArg,
+    /// Share of hidden answers that the simulated device tells as visible, from 0 to 1.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    pub(super) doubt: f64,
     /// Out of core: the MiB of geometry that each lane's device may hold (default: all of it).
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
     pub(super) memory: Option<u32>,
@@ -286,6 +292,16 @@ pub(super) enum CameraArg {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum LatencyArg {
+    /// As the cost model has it.
+    Even,
+    /// From nothing to four times that.
+    Jittery,
+    /// One batch in eight fifty times as late.
+    Spiky,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum DepthArg {
     /// From 0 near to 1 far: the lesser is the nearer.
     Forward,
@@ -330,6 +346,11 @@ fn viewport(text: &str) -> Result<Viewport, String> {
     }
 }
 
+fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|share| (0.0..=1.0).contains(share));
+    share.ok_or_else(|| "write a number from 0 to 1".to_owned())
+}
+
 fn simd(text: &str) -> Result<SimdLevel, String> {
     let here = SimdLevel::available();
     let level = text.parse()?;
@@ -362,6 +383,16 @@ impl SceneArgs {
             level: self.simd.unwrap_or(default.level),
             skip_hidden: default.skip_hidden && !self.every_triangle,
         }
+    }
+
+    /// What the simulated device does; its seed is the scene's.
+    pub(super) fn schedule(&self) -> Schedule {
+        let latency = match self.latency {
+            LatencyArg::Even => Latency::Even,
+            LatencyArg::Jittery => Latency::Jittery,
+            LatencyArg::Spiky => Latency::Spiky,
+        };
+        Schedule { latency, doubt: self.doubt, ..Schedule::default() }
     }
 
     /// The memory of each lane's device.
@@ -420,6 +451,13 @@ impl SceneArgs {
                 ProxyArg::Box => Some("box".to_owned()),
             },
         );
+        let latency = match self.latency {
+            LatencyArg::Even => None,
+            LatencyArg::Jittery => Some("jittery".to_owned()),
+            LatencyArg::Spiky => Some("spiky".to_owned()),
+        };
+        add("latency", latency);
+        add("doubt", (self.doubt > 0.0).then(|| self.doubt.to_string()));
         add("memory", self.memory.map(|mib| mib.to_string()));
         add("prefetch", self.prefetch.map(|mib| mib.to_string()));
         add("cost", (self.cost != "lavapipe").then(|| self.cost.clone()));

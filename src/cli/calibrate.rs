@@ -101,7 +101,10 @@ fn measure_on(
     [coarse, fine]: &[World; 2],
     bar: &indicatif::ProgressBar,
 ) -> Result<(String, Vec<Measurement>), CliError> {
-    let stages = [oracles.stage(&coarse.stage())?, oracles.stage(&fine.stage())?];
+    let stages = [
+        oracles.stage(&coarse.stage(), coarse.scene.seed)?,
+        oracles.stage(&fine.stage(), fine.scene.seed)?,
+    ];
     let bench = |world, stage: &StagedOracles<'_>, stream, count| {
         let (oracle, works) = (stage.make(&args.oracle)?, workloads(world, stream, count));
         Ok::<Bench<'_>, CliError>(Bench { world, oracle, works })

@@ -102,7 +102,8 @@ pub(super) fn compare(
     let cases = cases(args)?;
     let cache = pick_cache(&args.scene_args)?;
     let adapter = args.scene_args.adapter.as_deref();
-    let oracles = Oracles::open(&args.oracle, adapter, streams)?;
+    let oracles =
+        Oracles::open(&args.oracle, adapter, streams)?.simulating(&cost, &args.scene_args);
     let out = folder(&args.out)?;
     let repeat = match args.rounds {
         1 => REPEAT,

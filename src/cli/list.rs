@@ -25,6 +25,10 @@ pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<
             "hierarchical-z",
             "the reference's depth as a pyramid of maxima, a handful of texels a question",
         ),
+        (
+            "simulated",
+            "the reference as a device with a clock: late answers, doubt (--latency, --doubt)",
+        ),
         ("hardware", "occlusion queries of a Vulkan device through wgpu"),
         (
             "pyramid",

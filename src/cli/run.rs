@@ -13,7 +13,10 @@ use crate::check::Gate;
 use crate::cull::{Culler, CullerKind, CullerSetup, PerView};
 use crate::index::{Entry, INDEXES, IndexKind};
 use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
-use crate::oracle::{Always, CostModel, HierarchicalZ, Oracle, OracleError, Questions, Sim, Stage};
+use crate::oracle::{
+    Always, CostModel, HierarchicalZ, Oracle, OracleError, Questions, Schedule, Sim, Simulated,
+    Stage,
+};
 use crate::part::{Cache, PartId};
 use crate::report::{Row, junit, table};
 use crate::run::{
@@ -44,12 +47,14 @@ pub(super) fn interrupted() -> bool {
 pub(super) struct Oracles {
     names: Vec<String>,
     gpu: Option<Arc<Gpu>>,
+    /// What the simulated device costs and does.
+    simulated: (CostModel, Schedule),
 }
 
 impl Oracles {
     /// Whether every name is one of an oracle.
     pub(super) fn known(names: &[String]) -> Result<(), CliError> {
-        let known: Vec<&str> = ["sim", "hierarchical-z", "always"]
+        let known: Vec<&str> = ["sim", "hierarchical-z", "simulated", "always"]
             .into_iter()
             .chain(Questions::ALL.map(Questions::name))
             .collect();
@@ -74,8 +79,9 @@ impl Oracles {
         } else {
             names.to_vec()
         };
+        let simulated = (CostModel::lavapipe(), Schedule::default());
         match found {
-            Ok(gpu) => Ok(Self { names, gpu: Some(gpu) }),
+            Ok(gpu) => Ok(Self { names, gpu: Some(gpu), simulated }),
             Err(error) if wanted && asked_for => Err(error.into()),
             Err(error) => {
                 if wanted {
@@ -86,15 +92,23 @@ impl Oracles {
                     )?;
                 }
                 names.retain(|name| !on_device(name));
-                Ok(Self { names, gpu: None })
+                Ok(Self { names, gpu: None, simulated })
             }
         }
     }
 
-    /// One oracle a name for `stage`, made anew for each lane; the geometry on the device is shared.
-    pub(super) fn stage(&self, stage: &Stage) -> Result<StagedOracles<'_>, OracleError> {
+    /// The same with a simulated device of that cost, which does what the flags say.
+    pub(super) fn simulating(self, cost: &CostModel, args: &SceneArgs) -> Self {
+        Self { simulated: (cost.clone(), args.schedule()), ..self }
+    }
+
+    /// One oracle a name for `stage`, made anew for each lane; the geometry on the device is shared. The
+    /// simulated device has its streams from `seed`.
+    pub(super) fn stage(&self, stage: &Stage, seed: u64) -> Result<StagedOracles<'_>, OracleError> {
+        let (cost, schedule) = self.simulated.clone();
         Ok(StagedOracles {
             names: &self.names,
+            simulated: (cost, Schedule { seed, ..schedule }),
             stage: stage.clone(),
             gpu: self.gpu.as_ref().map(|gpu| GpuStage::new(gpu, stage)).transpose()?,
         })
@@ -109,6 +123,7 @@ fn on_device(name: &str) -> bool {
 /// The oracles of one invocation over one scene.
 pub(super) struct StagedOracles<'a> {
     names: &'a [String],
+    simulated: (CostModel, Schedule),
     stage: Stage,
     gpu: Option<Arc<GpuStage>>,
 }
@@ -119,6 +134,10 @@ impl StagedOracles<'_> {
         match name {
             "sim" => Ok(Box::new(Sim::new(self.stage.clone()))),
             "hierarchical-z" => Ok(Box::new(HierarchicalZ::new(self.stage.clone()))),
+            "simulated" => {
+                let (cost, schedule) = self.simulated.clone();
+                Ok(Box::new(Simulated::new(self.stage.clone(), cost, schedule)))
+            }
             "always" => Ok(Box::<Always>::default()),
             _ => {
                 let stage = self.gpu.as_ref().expect("hardware is named only where it was opened");
@@ -276,7 +295,7 @@ impl Plan<'_> {
         bar.suspend(|| built(&world, streams))?;
         let frames = world.scene.frames;
         let stage = world.stage();
-        let staged = self.oracles.stage(&stage)?;
+        let staged = self.oracles.stage(&stage, world.scene.seed)?;
         let entries = world.entries();
         let mut gates: Vec<Gate> = Vec::new();
         let lanes: Vec<(&str, CullerKind)> = staged
@@ -315,7 +334,7 @@ impl Plan<'_> {
         bar: &ProgressBar,
     ) -> Result<Vec<PartId>, CliError> {
         let stage = world.stage();
-        let staged = self.oracles.stage(&stage)?;
+        let staged = self.oracles.stage(&stage, world.scene.seed)?;
         let entries = world.entries();
         let mut seen = DrawnAt(moment, Vec::new());
         let oracle = staged.make(&staged.names[0])?;
@@ -339,7 +358,7 @@ impl Plan<'_> {
         work: impl FnOnce(&mut dyn Culler, &mut dyn Oracle) -> Result<T, RunError>,
     ) -> Result<T, CliError> {
         let stage = world.stage();
-        let staged = self.oracles.stage(&stage)?;
+        let staged = self.oracles.stage(&stage, world.scene.seed)?;
         let mut oracle = staged.make(&staged.names[0])?;
         let entries = world.entries();
         let mut culler = self.factory(self.cullers[0], world, &entries)();
@@ -412,9 +431,9 @@ pub(super) fn run(
     let plan = Plan {
         cullers: chosen,
         index,
-        cost,
         cache: pick_cache(&scene_args)?,
-        oracles: Oracles::open(&args.oracle, adapter, streams)?,
+        oracles: Oracles::open(&args.oracle, adapter, streams)?.simulating(&cost, &scene_args),
+        cost,
         repeat: REPEAT,
         with_bound: false,
         args: &scene_args,
@@ -542,7 +561,7 @@ pub(super) fn one_lane<'a>(
     Oracles::known(oracle)?;
     let named = Named::open(scene, args)?;
     let (cost, cache) = (pick_cost(args)?, pick_cache(args)?);
-    let oracles = Oracles::open(oracle, args.adapter.as_deref(), streams)?;
+    let oracles = Oracles::open(oracle, args.adapter.as_deref(), streams)?.simulating(&cost, args);
     let (cullers, repeat) = (chosen, REPEAT);
     Ok((Plan { cullers, index, oracles, cost, cache, repeat, with_bound: false, args }, named))
 }

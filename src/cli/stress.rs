@@ -2,7 +2,7 @@
 
 use std::io::BufRead;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -14,10 +14,15 @@ use super::args::quoted;
 use super::progress::progress_bar;
 use super::run::{Oracles, catch_interrupt, interrupted, pick_cullers};
 use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
-use crate::cull::CullerKind;
+use crate::cull::{Culler, CullerKind, CullerSetup, Pen, View};
 use crate::oracle::{Oracle, OracleError, Questions, Stage};
-use crate::run::RunError;
-use crate::stress::{Choice, Outcome, Shard, Tally, VERSION, judged, seed_of};
+use crate::report::{difference_picture, picture_png};
+use crate::run::{FrameState, RunError, Truth, render};
+use crate::scene::{Scene, to_toml};
+use crate::stress::{
+    Choice, Judged, Outcome, Shard, Shrunk, Tally, VERSION, judged, judged_in, seed_of, shrink,
+    size,
+};
 
 /// Seeds of a sweep where nothing is said.
 const DEFAULT_SEEDS: (u64, u64) = (0, 1000);
@@ -25,6 +30,10 @@ const DEFAULT_SEEDS: (u64, u64) = (0, 1000);
 const CHUNK: usize = 64;
 /// Failing seeds said in full.
 const SAID_FAILURES: usize = 5;
+/// Seeds looked at for a world in which something shows.
+const CANARIES: u64 = 100;
+/// Shrinking ends with what it has after this time.
+const SHRINK_TIME: Duration = Duration::from_secs(120);
 
 #[derive(Args, Clone)]
 pub(super) struct StressArgs {
@@ -54,6 +63,10 @@ pub(super) struct StressArgs {
     /// Fail as well where some situation was never reached.
     #[arg(long)]
     every_probe: bool,
+    /// Make the first failing world as small as it goes, and leave it in this folder: a scene file that
+    /// stands alone, a picture of the pixels that are missing, the line that runs it.
+    #[arg(long, value_name = "FOLDER")]
+    shrink: Option<PathBuf>,
     /// Add up the lines of these files, that sweeps wrote with --out, and run nothing.
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["seeds", "seed", "shard", "budget", "out"])]
     merge: Vec<PathBuf>,
@@ -107,12 +120,15 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
+    /// An oracle of the real device.
+    fn real(&self, stage: &Stage, questions: Questions) -> Result<Box<dyn Oracle>, OracleError> {
+        self.oracles.stage(stage, 0)?.make(questions.name())
+    }
+
     /// The world of a seed; a panic in it is a failure like any other.
     fn world(&self, seed: u64) -> Result<Outcome, RunError> {
         let choice = Choice::of(seed, &self.cullers, &self.real);
-        let real = |stage: &Stage, questions: Questions| -> Result<Box<dyn Oracle>, OracleError> {
-            self.oracles.stage(stage)?.make(questions.name())
-        };
+        let real = |stage: &Stage, questions| self.real(stage, questions);
         catch_unwind(AssertUnwindSafe(|| judged(&choice, &real))).unwrap_or_else(|panic| {
             let said = panic
                 .downcast_ref::<String>()
@@ -177,6 +193,105 @@ impl Sweep<'_> {
             }
         }
     }
+}
+
+impl Sweep<'_> {
+    /// Makes the world of a failing seed smaller and leaves it in `folder`.
+    fn shrink(
+        &self,
+        seed: u64,
+        folder: &Path,
+        to: &mut dyn std::io::Write,
+    ) -> Result<(), CliError> {
+        let mut choice = Choice::of(seed, &self.cullers, &self.real);
+        let real = |stage: &Stage, questions| self.real(stage, questions);
+        let scene = choice.scene()?;
+        let start = Instant::now();
+        let first_failure = |choice: &Choice, scene: &Scene| {
+            let late = start.elapsed() >= SHRINK_TIME || interrupted();
+            let run = || judged_in(choice, scene.clone(), &real);
+            match (late, catch_unwind(AssertUnwindSafe(run))) {
+                (true, _) => None,
+                (false, Ok(judged)) => judged.ok().and_then(|judged| judged.outcome.failed_in),
+                // A panic comes no earlier than it comes.
+                (false, Err(_)) => Some(scene.frames - 1),
+            }
+        };
+        let mut step = 0;
+        while let Some(simpler) = choice.simpler(step) {
+            if first_failure(&simpler, &scene).is_some() {
+                choice = simpler;
+            }
+            step += 1;
+        }
+        let mut fails = |scene: &Scene| first_failure(&choice, scene);
+        let Some(Shrunk { scene: small, tried }) = shrink(&scene, &mut fails) else {
+            writeln!(to, "seed {seed} does not fail when run again: nothing to shrink")?;
+            return Ok(());
+        };
+        let leaf_triangles = choice.partition.leaf_triangles;
+        let small = Scene { name: format!("seed-{seed}"), leaf_triangles, ..small };
+        std::fs::create_dir_all(folder)
+            .map_err(|source| CliError::Write { path: folder.display().to_string(), source })?;
+        let file = folder.join(format!("seed-{seed}.toml"));
+        OutFile::create(&file)?.finish(to_toml(&small).as_bytes())?;
+        let [before, after] = [&scene, &small].map(size);
+        writeln!(
+            to,
+            "shrunk: {} objects, {} frames, {} triangles of {}, {}, {}, in {tried} tries and {:.1} s: {}",
+            after.0,
+            after.1,
+            after.2,
+            before.0,
+            before.1,
+            before.2,
+            start.elapsed().as_secs_f64(),
+            file.display()
+        )?;
+        let judged = catch_unwind(AssertUnwindSafe(|| judged_in(&choice, small, &real)));
+        if let Ok(Ok(Judged { outcome, world, wrong: Some((moment, drawn)) })) = judged {
+            let state = FrameState::at(&world, moment);
+            let truth = Truth::of(&world, &state);
+            let mut image = world.image();
+            render(&world, &state, &drawn, &mut image);
+            let picture = file.with_extension("png");
+            let missing = difference_picture(&world, &truth.image, &image);
+            OutFile::create(&picture)?.finish(&picture_png(&missing))?;
+            outcome.failures.iter().try_for_each(|line| writeln!(to, "  {line}"))?;
+            writeln!(to, "  picture: {}", picture.display())?;
+        }
+        let file = quoted(&file.display().to_string());
+        writeln!(to, "  replay: plainsight run --scene {file}{}", choice.flags())?;
+        Ok(())
+    }
+}
+
+/// A culler that draws nothing.
+struct Blind;
+
+impl Culler for Blind {
+    fn name(&self) -> &str {
+        "blind"
+    }
+
+    fn frame(&mut self, _: &View<'_>, _: &mut Pen<'_>) -> Result<(), OracleError> {
+        Ok(())
+    }
+}
+
+/// Worlds that must fail, and do if failures are reported at all: a culler that draws nothing, where
+/// something shows. The first seeds in which nothing shows prove nothing and are passed over.
+fn canary() -> Result<bool, CliError> {
+    let make = |_: CullerSetup| Box::new(Blind) as Box<dyn Culler>;
+    let blind = CullerKind { name: "blind", summary: "draws nothing", asks: false, make };
+    for seed in 0..CANARIES {
+        let choice = Choice::of(seed, &[blind], &[]);
+        let outcome = judged(&choice, &|_, _| unreachable!("no real device is named"))?;
+        if outcome.visible > 0 {
+            return Ok(!outcome.failures.is_empty());
+        }
+    }
+    Ok(false)
 }
 
 /// Adds up the lines of files.
@@ -252,6 +367,10 @@ pub(super) fn stress(
     );
     bar.set_length((to - from).div_ceil(shard.count));
     let sweep = Sweep { args, cullers, real, oracles };
+    if !canary()? {
+        writeln!(streams.out, "FAILED: the canary, a culler that draws nothing, was not reported")?;
+        return Ok(EXIT_FAILED);
+    }
     let (mut tally, start) = (Tally::default(), Instant::now());
     let ran = sweep.run(shard.seeds(from, to), &bar, &mut |outcome| {
         tally.add(outcome);
@@ -289,6 +408,9 @@ pub(super) fn stress(
         writeln!(sink, "seed {}: {}; {}", only.seed, only.scene, only.options)?;
     }
     let code = conclude(args, &tally, sink)?;
+    if let (Some(folder), Some(failure)) = (&args.shrink, tally.failures.first()) {
+        sweep.shrink(failure.seed, folder, sink)?;
+    }
     if let Some(out) = out {
         out.finish(b"")?;
     }

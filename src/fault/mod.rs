@@ -29,7 +29,7 @@ use crate::index::{Entry, Index};
 use crate::oracle::{Oracle, Stage};
 use crate::part::PartedMesh;
 
-pub use trial::{Evidence, Trial, false_alarms, world};
+pub use trial::{Evidence, Trial, false_alarms, first_failure, world};
 
 /// Makes an oracle over a stage.
 pub type MakeOracle = fn(Stage) -> Box<dyn Oracle>;

@@ -171,6 +171,18 @@ pub fn false_alarms(
     Ok(lines.collect())
 }
 
+/// When a rig fails first in `world`; `None` where it holds.
+///
+/// # Errors
+/// [`RunError::Interrupted`] where `tick` says so.
+pub fn first_failure(
+    world: &World,
+    rig: Rig,
+    tick: &mut dyn FnMut() -> bool,
+) -> Result<Option<Moment>, RunError> {
+    Ok(gates(world, &[rig], tick)?[0].first_failure())
+}
+
 /// Each rig before a gate of its own.
 fn gates(
     world: &World,

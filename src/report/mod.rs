@@ -16,5 +16,5 @@ pub use columns::wrapped;
 pub use comparison::{Comparison, Published, TABLE_1};
 pub use junit::{JunitCase, junit};
 pub use memory::MemoryFigures;
-pub use picture::{Shown, depth_picture, part_picture, picture_png, top_view};
+pub use picture::{Shown, depth_picture, difference_picture, part_picture, picture_png, top_view};
 pub use row::{JSON_SCHEMA, Row, table};

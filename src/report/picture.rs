@@ -54,6 +54,20 @@ pub fn part_picture(world: &World, image: &Image) -> RgbImage {
     })
 }
 
+/// Where an image differs from the truth: red on the truth's parts, dimmed to grey.
+#[must_use]
+pub fn difference_picture(world: &World, truth: &Image, image: &Image) -> RgbImage {
+    paint(truth, |sample| {
+        if truth.word(sample) != image.word(sample) {
+            return [235, 30, 30];
+        }
+        truth.draw_index(sample).map_or([0; 3], |draw| {
+            let part = world.partition.part_of_draw(draw).0;
+            [60 + ((part + 1).wrapping_mul(2_654_435_761) >> 25) as u8; 3]
+        })
+    })
+}
+
 fn paint(image: &Image, color: impl Fn(usize) -> [u8; 3]) -> RgbImage {
     let viewport = image.viewport();
     let bytes = (0..image.sample_count()).flat_map(color).collect();

@@ -132,6 +132,66 @@ impl Choice {
     }
 }
 
+impl Choice {
+    /// The same with one thing as plain as it can be; `None` after the last of these steps.
+    #[must_use]
+    pub fn simpler(&self, step: usize) -> Option<Self> {
+        let sound =
+            |schedule: Schedule| Schedule { latency: Latency::Even, doubt: 0.0, ..schedule };
+        let device = match self.device {
+            Device::Simulated(schedule) => Device::Simulated(sound(schedule)),
+            other => other,
+        };
+        let split = PartitionKnobs { crossing: Crossing::Split, ..self.partition };
+        let list: [&dyn Fn(Self) -> Self; 6] = [
+            &|choice| Self { device, ..choice },
+            &|choice| Self { device: Device::Sim, ..choice },
+            &|choice| Self { proxy: ProxyKind::Rectangle, ..choice },
+            &|choice| Self { cost: CostModel::lavapipe(), ..choice },
+            &|choice| Self { partition: split, ..choice },
+            &|choice| Self { index: INDEXES[INDEXES.len() - 1], ..choice },
+        ];
+        list.get(step).map(|simpler| simpler(self.clone()))
+    }
+
+    /// The flags of `run` that pick the same beside a scene file, each with a space before it.
+    #[must_use]
+    pub fn flags(&self) -> String {
+        let mut flags = format!(" --culler {} --index {}", self.culler.name, self.index.name);
+        flags += match self.device {
+            Device::Sim => " --oracle sim",
+            Device::HierarchicalZ => " --oracle hierarchical-z",
+            Device::Simulated(Schedule { latency: Latency::Even, .. }) => " --oracle simulated",
+            Device::Simulated(Schedule { latency: Latency::Jittery, .. }) => {
+                " --oracle simulated --latency jittery"
+            }
+            Device::Simulated(Schedule { latency: Latency::Spiky, .. }) => {
+                " --oracle simulated --latency spiky"
+            }
+            Device::Real(_) => "",
+        };
+        match self.device {
+            Device::Simulated(Schedule { doubt, .. }) if doubt > 0.0 => {
+                flags += &format!(" --doubt {doubt}");
+            }
+            Device::Real(questions) => flags += &format!(" --oracle {}", questions.name()),
+            _ => {}
+        }
+        flags += match self.proxy {
+            ProxyKind::Rectangle => "",
+            ProxyKind::Hull => " --proxy hull",
+            ProxyKind::Box => " --proxy box",
+        };
+        if self.partition.crossing == Crossing::Whole {
+            flags += " --parts whole";
+        }
+        if self.cost.name != CostModel::lavapipe().name {
+            flags += &format!(" --cost {}", self.cost.name);
+        }
+        flags
+    }
+}
+
 impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Viewport { width, height } = self.viewport;

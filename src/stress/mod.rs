@@ -13,15 +13,18 @@
 //! | `probe` | situations that a sweep should reach |
 //! | `tally` | outcomes added up, from one sweep or from the lines of many |
 //! | `shard` | which seeds are this machine's |
+//! | `shrink` | a failing world made as small as it goes |
 
 mod choice;
 mod probe;
 mod shard;
+mod shrink;
 mod tally;
 mod world;
 
 pub use choice::{Choice, Device, seed_of};
 pub use probe::{Probe, Reached};
 pub use shard::{Shard, ShardError};
+pub use shrink::{FirstFailure, Shrunk, shrink, size};
 pub use tally::{Tally, VERSION};
-pub use world::{MakeReal, Outcome, REPEATED_ONE_IN, judged};
+pub use world::{Judged, MakeReal, Outcome, REPEATED_ONE_IN, judged, judged_in};

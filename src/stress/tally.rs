@@ -85,6 +85,7 @@ mod tests {
             options: String::new(),
             scene: String::new(),
             shots: 10,
+            failed_in: None,
             failures: failures.iter().map(|line| (*line).to_owned()).collect(),
             reached: vec![Probe::Jumped.to_string()],
             drawn,

@@ -7,8 +7,9 @@ use super::{Choice, Device, Reached};
 use crate::check::Gate;
 use crate::cull::{CullerSetup, PerView};
 use crate::oracle::{HierarchicalZ, Oracle, OracleError, Questions, Sim, Simulated, Stage};
+use crate::part::PartId;
 use crate::run::{
-    FrameRecord, FrameTrace, Lane, LaneInfo, Observer, Repeat, RunError, Trace, World, run,
+    FrameRecord, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World, run,
 };
 use crate::scene::{Lens, Scene};
 
@@ -29,6 +30,8 @@ pub struct Outcome {
     pub shots: u32,
     /// What failed, a line each; empty where all held.
     pub failures: Vec<String>,
+    /// The frame in which something failed first.
+    pub failed_in: Option<u32>,
     /// Names of the probes that were reached.
     pub reached: Vec<String>,
     /// Parts drawn, over all frames.
@@ -53,12 +56,17 @@ pub struct Outcome {
 struct Watched {
     gate: Gate,
     watch: Watch,
+    /// What was drawn when something failed first.
+    wrong: Option<(Moment, Vec<PartId>)>,
 }
 
 impl Observer for Watched {
     fn frame(&mut self, record: &FrameRecord<'_>) {
         self.gate.frame(record);
         self.watch.frame(record);
+        if self.wrong.is_none() && self.gate.first_failure().is_some() {
+            self.wrong = Some((record.state.moment, record.drawn.to_vec()));
+        }
     }
 
     fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
@@ -79,7 +87,28 @@ pub type MakeReal<'a> = dyn Fn(&Stage, Questions) -> Result<Box<dyn Oracle>, Ora
 /// Where a culler's own invariants are broken, in builds with debug assertions.
 pub fn judged(choice: &Choice, real: &MakeReal<'_>) -> Result<Outcome, RunError> {
     let scene = choice.scene().expect("the swarm has a scene for every seed");
-    let said = summary(&scene);
+    judged_in(choice, scene, real).map(|judged| judged.outcome)
+}
+
+/// A world run and judged, with what there is to look at where something failed.
+pub struct Judged {
+    /// What became of it.
+    pub outcome: Outcome,
+    /// The world.
+    pub world: World,
+    /// When something failed first, and the parts drawn then.
+    pub wrong: Option<(Moment, Vec<PartId>)>,
+}
+
+/// The same in another scene than the choice's own.
+///
+/// # Errors
+/// As [`judged`].
+///
+/// # Panics
+/// As [`judged`].
+pub fn judged_in(choice: &Choice, scene: Scene, real: &MakeReal<'_>) -> Result<Judged, RunError> {
+    let (said, frames) = (summary(&scene), scene.frames);
     let world = World::new(scene, choice.partition);
     let stage = world.stage();
     let oracle: Box<dyn Oracle> = match choice.device {
@@ -104,9 +133,10 @@ pub fn judged(choice: &Choice, real: &MakeReal<'_>) -> Result<Outcome, RunError>
     let culler = Box::new(|| PerView::over(world.views(), make));
     let lane = Lane { info, culler, oracle, observer: &mut watched, with_bound: false };
     let repeated = choice.seed.is_multiple_of(REPEATED_ONE_IN);
-    let repeat = if repeated { Repeat::first(choice.frames) } else { Repeat::NONE };
-    let traces = run(&world, choice.frames, repeat, &mut [lane], &mut || true)?;
-    Ok(outcome(choice, said, &traces[0], &mut watched, repeated))
+    let repeat = if repeated { Repeat::first(frames) } else { Repeat::NONE };
+    let traces = run(&world, frames, repeat, &mut [lane], &mut || true)?;
+    let outcome = outcome(choice, said, &traces[0], &mut watched, repeated);
+    Ok(Judged { outcome, wrong: watched.wrong, world })
 }
 
 impl Outcome {
@@ -119,6 +149,7 @@ impl Outcome {
             scene: choice.scene().map_or_else(|error| error.to_string(), |scene| summary(&scene)),
             shots: 0,
             failures: vec![format!("panic: {said}")],
+            failed_in: None,
             reached: Vec::new(),
             drawn: 0,
             visible: 0,
@@ -135,7 +166,7 @@ fn outcome(
     choice: &Choice,
     scene: String,
     trace: &Trace,
-    Watched { gate, watch }: &mut Watched,
+    Watched { gate, watch, .. }: &mut Watched,
     repeated: bool,
 ) -> Outcome {
     let reached: &mut Reached = &mut watch.reached;
@@ -152,6 +183,7 @@ fn outcome(
         scene,
         shots: trace.frames.len() as u32,
         failures: gate.failures(),
+        failed_in: gate.first_failure().map(|moment| moment.frame),
         reached: reached.probes().iter().map(Probe::to_string).collect(),
         drawn: trace.sum(|frame| u64::from(frame.drawn_parts)),
         visible: trace.sum(|frame| u64::from(frame.visible_parts)),
