@@ -198,6 +198,21 @@ mod tests {
         }
     }
 
+    /// The new vertex comes from the outside one towards the inside one, each operation rounded once.
+    #[test]
+    fn a_cut_is_rounded_as_written() {
+        let clipper = Clipper::new(VIEWPORT, DepthOrder::Forward);
+        let (out, inside) = ([0.3, 0.7, -0.1, 1.3], [0.9, -0.2, 0.6, 2.1]);
+        let polygon = clipper.clip([out, inside, [0.1, 0.1, 0.5, 1.0]]).unwrap();
+        let t = -0.1_f32 / (-0.1_f32 - 0.6_f32);
+        let expected: ClipVertex = std::array::from_fn(|c| out[c] + t * (inside[c] - out[c]));
+        assert!(polygon.corners().contains(&expected), "{expected:?} in {polygon:?}");
+        // The other way round rounds to other bits.
+        let t = 0.6_f32 / (0.6_f32 - -0.1_f32);
+        let backward: ClipVertex = std::array::from_fn(|c| inside[c] + t * (out[c] - inside[c]));
+        assert_ne!(expected, backward);
+    }
+
     /// Half of an edge, with numbers that f32 holds.
     #[test]
     fn a_cut_in_the_middle_is_exact() {

@@ -335,6 +335,31 @@ fn rectangles_count_over_regions() {
     }
 }
 
+/// Images are equal if their size, their order and all their samples are, and hash alike only then.
+#[test]
+fn images_differ_by_any_sample() {
+    let viewport = Viewport { width: 20, height: 9 };
+    let empty = Image::new(viewport);
+    let with = |z: f32, rank: u32| {
+        let mut image = Image::new(viewport);
+        let p = [[-0.1, -0.1, z], [0.1, -0.1, z], [0.0, 0.2, z]];
+        naive::draw(&mut image, &draw(IDENTITY, &p, &[[0, 1, 2]], &[rank]));
+        image
+    };
+    let one = with(0.5, 0);
+    assert!(one == with(0.5, 0) && one.hash() == with(0.5, 0).hash());
+    let others = [
+        empty.clone(),
+        with(0.5_f32.next_up(), 0),
+        with(0.5, 1),
+        Image::new(Viewport { width: 9, height: 20 }),
+    ];
+    for other in others {
+        assert!(one != other && one.hash() != other.hash());
+    }
+    assert!(empty != Image::ordered(viewport, DepthOrder::Reversed), "another order");
+}
+
 /// Questions: less or equal, within the rectangle only.
 #[test]
 fn rectangles_count_what_passes() {

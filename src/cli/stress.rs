@@ -238,13 +238,13 @@ impl Sweep<'_> {
         let [before, after] = [&scene, &small].map(size);
         writeln!(
             to,
-            "shrunk: {} objects, {} frames, {} triangles of {}, {}, {}, in {tried} tries and {:.1} s: {}",
-            after.0,
-            after.1,
-            after.2,
+            "shrunk from {} objects, {} frames, {} triangles to {}, {}, {} in {tried} tries and {:.1} s: {}",
             before.0,
             before.1,
             before.2,
+            after.0,
+            after.1,
+            after.2,
             start.elapsed().as_secs_f64(),
             file.display()
         )?;
