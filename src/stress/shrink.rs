@@ -105,6 +105,23 @@ impl Work<'_, '_> {
             still.effects.motion = None;
             self.takes(still);
         }
+        // Then each by itself.
+        let count = |scene: &Scene| {
+            let effects = &scene.effects;
+            let jumpers = effects.teleport.as_ref().map_or(0, |teleport| teleport.jumpers.len());
+            (effects.motion.as_ref().map_or(0, |motion| motion.movers.len()), jumpers)
+        };
+        for place in (0..count(&self.scene).0).rev() {
+            let mut still = self.scene.clone();
+            still.effects.motion.iter_mut().for_each(|motion| drop(motion.movers.remove(place)));
+            self.takes(still);
+        }
+        for place in (0..count(&self.scene).1).rev() {
+            let mut still = self.scene.clone();
+            let teleport = still.effects.teleport.iter_mut();
+            teleport.for_each(|teleport| drop(teleport.jumpers.remove(place)));
+            self.takes(still);
+        }
     }
 
     fn leave_out_views(&mut self) {
