@@ -160,7 +160,7 @@ fn too_small_a_budget_is_one_line_and_exit_2() {
             small.filter(|&word| verb != "picture" || word != "--frames").collect();
         let (code, said, talk) = plainsight(&[&scene, &small[..], out].concat());
         assert_eq!(code, 2, "{verb}: {said}{talk}");
-        let says = "--memory, powerplant: 1.00 MiB of device memory do not hold the largest mesh; give at least 7 MiB";
+        let says = "--memory, powerplant: 1.00 MiB of device memory do not hold the largest mesh; give at least 5 MiB";
         assert!(talk.contains(says), "{verb} said {talk}");
         assert_eq!(talk.lines().count(), 1, "{verb} said {talk}");
         assert!(said.is_empty(), "{verb} wrote {said}");
