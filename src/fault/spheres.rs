@@ -9,6 +9,7 @@ use super::{Fault, Rig, two_pass};
 use crate::cull::{Culler, CullerSetup, Pen, View};
 use crate::oracle::{Always, OracleError};
 use crate::part::ObjectId;
+use crate::scene::DepthOrder;
 
 /// What is broken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,14 +56,12 @@ impl Spheres {
         let rows = view.clip_from_world.transpose();
         let (x, y, z, w) = (rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis);
         let [ex, ey, ez, ew] = error;
-        let planes: [(DVec4, f64); 6] = [
-            (w + x, ew + ex),
-            (w - x, ew + ex),
-            (w + y, ew + ey),
-            (w - y, ew + ey),
-            (z, ez),
-            (w - z, ew + ez),
-        ];
+        let [near, far] = match view.depth {
+            DepthOrder::Forward => [(z, ez), (w - z, ew + ez)],
+            DepthOrder::Reversed => [(w + z, ew + ez), (-z, ez)],
+        };
+        let planes: [(DVec4, f64); 6] =
+            [(w + x, ew + ex), (w - x, ew + ex), (w + y, ew + ey), (w - y, ew + ey), near, far];
         planes.into_iter().any(|(plane, error)| {
             let (normal, at) = (plane.truncate(), center.extend(1.0));
             let distance = plane.dot(at);

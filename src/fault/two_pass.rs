@@ -162,7 +162,8 @@ fn euclidean_depth(view: &View<'_>, world: &Aabb) -> f32 {
     let clip = view.clip_from_world * ahead.extend(1.0);
     let depth =
         if matches!(camera.lens, Lens::Perspective { .. }) { clip.z / clip.w } else { clip.z };
-    (depth as f32).clamp(0.0, 1.0)
+    let [near, far] = view.depth.range();
+    (depth as f32).clamp(near, far)
 }
 
 impl Culler for TwoPass {
