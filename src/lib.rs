@@ -19,6 +19,7 @@
 //! | [`run`] | scene + culler + oracle to a trace, observed frame by frame | the checks |
 //! | [`check`] | observers of a run, one property per file | reports |
 //! | [`fault`] | real bug classes seeded in cullers, oracles, indexes and math; trials of the gate | reports |
+//! | [`stress`] | worlds picked by seeds, run and judged by the thousand; shrinking what fails | reports |
 //! | [`foreign`] | what cullers of other engines are told and what they answer | how it is judged, reports |
 //! | [`report`] | tables and pictures | |
 //! | [`cli`] | verbs; wires checks to runs | |

@@ -71,7 +71,8 @@ fetch_swiftshader() {
   mv "$partial" "$folder"
 }
 
-if [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ]; then
+# A device named by PLAINSIGHT_ADAPTER is not hidden by a pin.
+if [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}${PLAINSIGHT_ADAPTER:-}" ]; then
   [ -n "$(drivers)" ] || install_lavapipe
   lavapipe=$(drivers | grep -m1 lvp_icd || true)
   if [ -n "$lavapipe" ]; then

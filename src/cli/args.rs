@@ -451,12 +451,8 @@ impl SceneArgs {
                 ProxyArg::Box => Some("box".to_owned()),
             },
         );
-        let latency = match self.latency {
-            LatencyArg::Even => None,
-            LatencyArg::Jittery => Some("jittery".to_owned()),
-            LatencyArg::Spiky => Some("spiky".to_owned()),
-        };
-        add("latency", latency);
+        let latency = self.schedule().latency;
+        add("latency", (latency != Latency::Even).then(|| latency.name().to_owned()));
         add("doubt", (self.doubt > 0.0).then(|| self.doubt.to_string()));
         add("memory", self.memory.map(|mib| mib.to_string()));
         add("prefetch", self.prefetch.map(|mib| mib.to_string()));

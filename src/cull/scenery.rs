@@ -97,7 +97,7 @@ pub enum Appearance {
     Ask {
         /// Where it can be.
         rectangle: PixelRectangle,
-        /// How near it can be, in [0, 1].
+        /// How near it can be, between the planes.
         depth: f32,
         /// What to ask about.
         proxy: Proxy,

@@ -54,7 +54,7 @@ pub struct FrameView<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Proxy {
     /// A rectangle of whole pixels, columns `min[0]..max[0]`, rows `min[1]..max[1]` (row 0 on top),
-    /// within the viewport and not empty, at one depth in [0, 1].
+    /// within the viewport and not empty, at one depth between the planes.
     Rectangle {
         /// First column and row.
         min: [u32; 2],
@@ -63,7 +63,7 @@ pub enum Proxy {
         /// Depth of every sample.
         depth: f32,
     },
-    /// A convex polygon at one depth in [0, 1]. An oracle that answers rectangles alone takes the one
+    /// A convex polygon at one depth between the planes. An oracle that answers rectangles alone takes the one
     /// around it, at the same depth: that errs towards "visible" only.
     Hull {
         /// The polygon, within the rectangle.

@@ -33,6 +33,18 @@ pub enum Latency {
     Spiky,
 }
 
+impl Latency {
+    /// Its name in flags and reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Even => "even",
+            Self::Jittery => "jittery",
+            Self::Spiky => "spiky",
+        }
+    }
+}
+
 /// What no device may do, once in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Misbehaviour {

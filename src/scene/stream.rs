@@ -31,6 +31,14 @@ impl Stream {
         low + (high - low) * self.unit()
     }
 
+    /// One of several, all as likely.
+    ///
+    /// # Panics
+    /// For none to choose from.
+    pub fn pick<T: Copy>(&mut self, from: &[T]) -> T {
+        from[self.below(from.len() as u32) as usize]
+    }
+
     /// Uniform in 0..count by Lemire's multiply-shift; the bias is below count / 2⁶⁴.
     ///
     /// # Panics

@@ -58,10 +58,6 @@ pub fn seed_of(text: &str) -> Result<u64, String> {
     seed.map_err(|_| format!("'{text}' is no seed: write a number or a commit's hash of 40 digits"))
 }
 
-fn pick<T: Copy>(stream: &mut Stream, from: &[T]) -> T {
-    from[stream.below(from.len() as u32) as usize]
-}
-
 impl Choice {
     /// What `seed` picks among `cullers`, of which there is at least one; on real devices by each of `real`,
     /// if any are given, in the place of simulated ones.
@@ -82,32 +78,32 @@ impl Choice {
             [31, 200],
             [1, 1],
         ];
-        let [width, height] = pick(&mut picture, &sizes);
+        let [width, height] = picture.pick(&sizes);
         let depth = match picture.below(4) {
             0 => DepthOrder::Reversed,
             _ => DepthOrder::Forward,
         };
-        let frames = pick(&mut picture, &[SWARM.frames, SWARM.frames, SWARM.frames, 3, 24]);
+        let frames = picture.pick(&[SWARM.frames, SWARM.frames, SWARM.frames, 3, 24]);
         let mut cut = Stream::new(seed, "cut");
         let partition = PartitionKnobs {
-            leaf_triangles: pick(&mut cut, &[SWARM.leaf_triangles, SWARM.leaf_triangles, 7, 1000]),
+            leaf_triangles: cut.pick(&[SWARM.leaf_triangles, SWARM.leaf_triangles, 7, 1000]),
             crossing: if cut.below(4) == 0 { Crossing::Whole } else { Crossing::Split },
         };
         let mut culler = Stream::new(seed, "culler");
-        let kind = pick(&mut culler, cullers);
-        let proxy = pick(&mut culler, &[ProxyKind::Rectangle, ProxyKind::Hull, ProxyKind::Box]);
-        let index = pick(&mut Stream::new(seed, "index"), INDEXES);
+        let kind = culler.pick(cullers);
+        let proxy = culler.pick(&[ProxyKind::Rectangle, ProxyKind::Hull, ProxyKind::Box]);
+        let index = Stream::new(seed, "index").pick(INDEXES);
         let costs = CostModel::named();
         let cost = costs[culler.below(costs.len() as u32) as usize].clone();
         let mut device = Stream::new(seed, "device");
         let schedule = Schedule {
             seed,
-            latency: pick(&mut device, &[Latency::Even, Latency::Jittery, Latency::Spiky]),
-            doubt: pick(&mut device, &[0.0, 0.0, 0.05, 0.5, 1.0]),
+            latency: device.pick(&[Latency::Even, Latency::Jittery, Latency::Spiky]),
+            doubt: device.pick(&[0.0, 0.0, 0.05, 0.5, 1.0]),
             misbehaviour: None,
         };
         let device = match device.below(8) {
-            _ if !real.is_empty() => Device::Real(pick(&mut device, real)),
+            _ if !real.is_empty() => Device::Real(device.pick(real)),
             0 => Device::Sim,
             1 => Device::HierarchicalZ,
             _ => Device::Simulated(schedule),
@@ -158,24 +154,14 @@ impl Choice {
     #[must_use]
     pub fn flags(&self) -> String {
         let mut flags = format!(" --culler {} --index {}", self.culler.name, self.index.name);
-        flags += match self.device {
-            Device::Sim => " --oracle sim",
-            Device::HierarchicalZ => " --oracle hierarchical-z",
-            Device::Simulated(Schedule { latency: Latency::Even, .. }) => " --oracle simulated",
-            Device::Simulated(Schedule { latency: Latency::Jittery, .. }) => {
-                " --oracle simulated --latency jittery"
-            }
-            Device::Simulated(Schedule { latency: Latency::Spiky, .. }) => {
-                " --oracle simulated --latency spiky"
-            }
-            Device::Real(_) => "",
-        };
         match self.device {
-            Device::Simulated(Schedule { doubt, .. }) if doubt > 0.0 => {
-                flags += &format!(" --doubt {doubt}");
+            Device::Sim => flags += " --oracle sim",
+            Device::HierarchicalZ => flags += " --oracle hierarchical-z",
+            Device::Simulated(Schedule { latency, doubt, .. }) => {
+                flags +=
+                    &format!(" --oracle simulated --latency {} --doubt {doubt}", latency.name());
             }
             Device::Real(questions) => flags += &format!(" --oracle {}", questions.name()),
-            _ => {}
         }
         flags += match self.proxy {
             ProxyKind::Rectangle => "",
@@ -221,11 +207,7 @@ impl fmt::Display for Choice {
             Device::Sim => f.write_str("sim"),
             Device::HierarchicalZ => f.write_str("hierarchical-z"),
             Device::Simulated(Schedule { latency, doubt, .. }) => {
-                let latency = match latency {
-                    Latency::Even => "even",
-                    Latency::Jittery => "jittery",
-                    Latency::Spiky => "spiky",
-                };
+                let latency = latency.name();
                 write!(f, "simulated ({latency} latency, doubt {doubt})")
             }
             Device::Real(questions) => f.write_str(questions.name()),

@@ -33,11 +33,6 @@ const MOST_OBJECTS: u32 = 100;
 /// Fewest and most triangles of a mesh.
 const TRIANGLES: [u32; 2] = [12, 300];
 
-/// One of several, all as likely.
-fn pick<T: Copy>(stream: &mut Stream, from: &[T]) -> T {
-    from[stream.below(from.len() as u32) as usize]
-}
-
 fn within(stream: &mut Stream, reach: DVec3) -> DVec3 {
     let mut along = |reach: f64| stream.range(-reach, reach);
     DVec3::new(along(reach.x), along(reach.y), along(reach.z))
@@ -61,8 +56,8 @@ enum Layout {
 fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
     let mut layout = Stream::new(chosen.seed, "layout");
     // Far from the origin of the world, or large or tiny as a whole, now and then.
-    let size = pick(&mut layout, &[1.0, 1.0, 1.0, 1.0, 1e-3, 1e3]);
-    let origin = pick(&mut layout, &[0.0, 0.0, 0.0, 0.0, 1e3, 1e5]) * size;
+    let size = layout.pick(&[1.0, 1.0, 1.0, 1.0, 1e-3, 1e3]);
+    let origin = layout.pick(&[0.0, 0.0, 0.0, 0.0, 1e3, 1e5]) * size;
     let middle = DVec3::new(origin, 0.0, -origin);
     let meshes = meshes(chosen.seed);
     let mut objects = placed(chosen, &mut layout, meshes.len() as u32);
@@ -91,7 +86,7 @@ fn meshes(seed: u64) -> Vec<Arc<Mesh>> {
     let mut shape = Stream::new(seed, "shape");
     let count = 1 + shape.below(6);
     let mesh = |number: u32| {
-        let triangles = pick(&mut shape, &[TRIANGLES[0], 40, 100, 200, TRIANGLES[1]]);
+        let triangles = shape.pick(&[TRIANGLES[0], 40, 100, 200, TRIANGLES[1]]);
         let mut builder = Builder::default();
         let kind = if number == 0 { 1 } else { shape.below(6) };
         match kind {
@@ -148,10 +143,10 @@ fn placed(chosen: &Chosen, layout: &mut Stream, meshes: u32) -> Vec<Object> {
         Layout::Rooms,
         Layout::Heap,
     ];
-    let kind = pick(layout, &kinds);
+    let kind = layout.pick(&kinds);
     // Distorted placements fully or not at all.
     let (turned, distorted) = (layout.below(3) > 0, layout.below(4) == 0);
-    let largest = pick(layout, &[0.5, 1.5, 4.0]);
+    let largest = layout.pick(&[0.5, 1.5, 4.0]);
     let count = (f64::from(1 + layout.below(MOST_OBJECTS)) * chosen.scale).ceil() as u32;
     let mut objects = Vec::new();
     let walls = |objects: &mut Vec<Object>, translation: DVec3, scale: DVec3| {
@@ -200,9 +195,9 @@ fn placed(chosen: &Chosen, layout: &mut Stream, meshes: u32) -> Vec<Object> {
         let mut placement = Placement { translation, scale, rotation, ..Placement::IDENTITY };
         if distorted {
             placement.scale *= DVec3::new(
-                pick(&mut place, &[1.0, -1.0, 0.01, 10.0]),
+                place.pick(&[1.0, -1.0, 0.01, 10.0]),
                 1.0,
-                pick(&mut place, &[1.0, 1.0, 0.0, 3.0]),
+                place.pick(&[1.0, 1.0, 0.0, 3.0]),
             );
             placement.shear = within(&mut place, DVec3::ONE);
         }
@@ -214,8 +209,8 @@ fn placed(chosen: &Chosen, layout: &mut Stream, meshes: u32) -> Vec<Object> {
 /// Who moves and who jumps.
 fn effects(seed: u64, objects: &[Object], middle: DVec3, size: f64) -> Effects {
     let mut motion = Stream::new(seed, "motion");
-    let share = pick(&mut motion, &[0, 0, 1, 8, 16]);
-    let fastest = pick(&mut motion, &[0.02, 0.3, 6.0]) * size;
+    let share = motion.pick(&[0, 0, 1, 8, 16]);
+    let fastest = motion.pick(&[0.02, 0.3, 6.0]) * size;
     let (min, max) = (middle - DVec3::splat(SPACE * size), middle + DVec3::splat(SPACE * size));
     let mut movers = Vec::new();
     for number in 0..objects.len() as u32 {
@@ -236,7 +231,7 @@ fn effects(seed: u64, objects: &[Object], middle: DVec3, size: f64) -> Effects {
         movers.push((number, path));
     }
     let mut jump = Stream::new(seed, "teleport");
-    let share = pick(&mut jump, &[0, 0, 0, 2, 16]);
+    let share = jump.pick(&[0, 0, 0, 2, 16]);
     let mut jumpers = Vec::new();
     for number in 0..objects.len() as u32 {
         if jump.below(16) < share {
@@ -255,7 +250,7 @@ fn cameras(chosen: &Chosen, middle: DVec3, size: f64) -> Vec<CameraPath> {
     let mut camera = Stream::new(chosen.seed, "camera");
     // Outside looking in, anywhere inside, or still.
     let inside = camera.below(2) == 0;
-    let poses = pick(&mut camera, &[1, 2, 2, 3, 5]);
+    let poses = camera.pick(&[1, 2, 2, 3, 5]);
     let pose = |camera: &mut Stream| {
         let place = within(camera, DVec3::new(SPACE, SPACE * 0.3, SPACE));
         let away = if inside { place } else { place + DVec3::new(0.0, 0.0, SPACE * 2.0) };
@@ -267,8 +262,8 @@ fn cameras(chosen: &Chosen, middle: DVec3, size: f64) -> Vec<CameraPath> {
     let path = |camera: &mut Stream| {
         let poses: Vec<CameraPose> = (0..poses).map(|_| pose(camera)).collect();
         let travel = if camera.below(5) == 0 { Travel::Jump } else { Travel::Glide };
-        let near = pick(camera, &[0.1, 0.1, 0.001, 2.0]) * size;
-        let degrees: f64 = pick(camera, &[60.0, 60.0, 60.0, 90.0, 5.0, 150.0]);
+        let near = camera.pick(&[0.1, 0.1, 0.001, 2.0]) * size;
+        let degrees: f64 = camera.pick(&[60.0, 60.0, 60.0, 90.0, 5.0, 150.0]);
         let lens = match camera.below(8) {
             0 => Lens::Orthographic { height: camera.range(2.0, 2.0 * SPACE) * size },
             1 => Lens::Perspective {
