@@ -28,7 +28,7 @@ pub(crate) const BLOCK: usize = 8;
 /// Blocks along a side of a region.
 pub(crate) const BLOCKS: usize = REGION / BLOCK;
 
-use crate::order::{DepthOrder, FARTHEST};
+use crate::order::{DepthOrder, FARTHEST, Forward, Order, Reversed};
 
 /// A sample without a fragment: the farthest depth and no draw index. Keys of depths order like the
 /// numbers, so the smaller word is the nearer fragment, then the lower draw index. Keys reach at most
@@ -188,8 +188,23 @@ impl Image {
     }
 
     /// All depths, row by row.
-    pub fn depths(&self) -> impl Iterator<Item = f32> + '_ {
-        self.words().map(|word| self.depth_of(word))
+    #[must_use]
+    pub fn depths(&self) -> Vec<f32> {
+        match self.order {
+            DepthOrder::Forward => self.depths_ordered(Forward),
+            DepthOrder::Reversed => self.depths_ordered(Reversed),
+        }
+    }
+
+    fn depths_ordered<O: Order>(&self, _: O) -> Vec<f32> {
+        let mut depths = Vec::with_capacity(self.sample_count());
+        // Piece by piece and the order known: an iterator over single words costs twenty times as much.
+        for row in 0..self.viewport.height as usize {
+            for piece in self.pieces(row, 0, self.viewport.width as usize) {
+                depths.extend(piece.iter().map(|&word| O::ORDER.depth((word as u64 >> 32) as u32)));
+            }
+        }
+        depths
     }
 
     /// Draw index at a sample; `None` where nothing was drawn.
@@ -203,13 +218,28 @@ impl Image {
         self.words().map(draw_index_of)
     }
 
-    /// A hash of size and samples: FNV-1a over whole words with a rotation, the same everywhere.
+    /// A hash of size and samples, the same everywhere: FNV-1a over whole words with a rotation, in four
+    /// chains, each of every fourth word of a row of a region; one chain would wait for its multiplications.
     #[must_use]
     pub fn hash(&self) -> u64 {
+        let step =
+            |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
         let size = u64::from(self.viewport.width) << 32 | u64::from(self.viewport.height);
-        self.words().fold(size ^ 0xcbf2_9ce4_8422_2325, |hash, word| {
-            (hash ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29)
-        })
+        let mut chains = [0, 1, 2, 3].map(|chain| step(size ^ 0xcbf2_9ce4_8422_2325, chain));
+        for row in 0..self.viewport.height as usize {
+            for piece in self.pieces(row, 0, self.viewport.width as usize) {
+                let (fours, rest) = piece.as_chunks::<4>();
+                for four in fours {
+                    for (chain, &word) in chains.iter_mut().zip(four) {
+                        *chain = step(*chain, word as u64);
+                    }
+                }
+                for (chain, &word) in chains.iter_mut().zip(rest) {
+                    *chain = step(*chain, word as u64);
+                }
+            }
+        }
+        chains.into_iter().fold(size, step)
     }
 
     /// How many samples of the half-open rectangle have `depth` ≤ their own. Parts outside the image

@@ -37,7 +37,7 @@ impl Difference {
     }
 }
 
-/// Renders what was drawn and compares.
+/// Renders what was drawn, where the oracle has not done so, and compares.
 #[derive(Default)]
 pub struct ImageCheck {
     image: Option<Image>,
@@ -47,8 +47,14 @@ pub struct ImageCheck {
 impl ImageCheck {
     /// Compares one frame.
     pub fn frame(&mut self, record: &FrameRecord<'_>) {
-        let image = self.image.get_or_insert_with(|| record.world.image());
-        render(record.world, record.state, record.drawn, image);
+        let image = match record.reference {
+            Some(image) => image,
+            None => {
+                let image = self.image.get_or_insert_with(|| record.world.image());
+                render(record.world, record.state, record.drawn, image);
+                image
+            }
+        };
         let all = &record.truth.image;
         if image == all {
             return;

@@ -7,8 +7,8 @@
 //!    is exact but for step 4.
 //! 2. It is dilated under the max norm by M, the margin rounded up to the grid with half a step for
 //!    step 1: the corner becomes a square of half-side M, in sub-pixels, on each axis its own.
-//! 3. The convex hull of the squares (Andrew 1979, *Another efficient algorithm for convex hulls in two
-//!    dimensions*) is the Minkowski sum of the corners' hull and one square.
+//! 3. The convex hull of the squares is the Minkowski sum of the corners' hull (Andrew 1979, *Another
+//!    efficient algorithm for convex hulls in two dimensions*) and one square.
 //! 4. It is cut by the sides of the box's pixel rectangle (Sutherland & Hodgman 1974), so that it never
 //!    covers a sample that the rectangle does not, and never leaves the viewport. New corners go to the
 //!    nearest place of the grid.
@@ -189,20 +189,18 @@ impl ClipBox {
         let subpixels = f64::from(HULL_SUBPIXELS);
         let half =
             window.bound.map(|bound| ((bound + margins.hull_pixels) * subpixels + 0.5).ceil());
-        let mut places = [[0; 2]; 32];
-        for (square, corner) in places.chunks_exact_mut(4).zip(&window.corners) {
+        let mut middles = [[0; 2]; 8];
+        for (place, corner) in middles.iter_mut().zip(&window.corners) {
             let middle = corner.map(|at| (at * subpixels).round());
             // Written so that NaN gives up.
             if !(0..2).all(|axis| middle[axis].abs() + half[axis] <= FARTHEST) {
                 return Outline::Rectangle;
             }
-            let side = |axis: usize, sign: f64| (middle[axis] + sign * half[axis]) as i32;
-            let signs = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
-            square.copy_from_slice(&signs.map(|s| [side(0, s[0]), side(1, s[1])]));
+            *place = middle.map(|at| at as i32);
         }
         let PixelRectangle { min, max } = rectangle;
         let edge = |pixel: u32| pixel as i32 * HULL_SUBPIXELS;
-        let mut cut = convex_hull(&mut places);
+        let mut cut = Some(dilated_hull(&mut middles, half.map(|half| half as i32)));
         for axis in 0..2 {
             let (low, high) = (edge(min[axis]), edge(max[axis]));
             cut = cut
@@ -232,35 +230,135 @@ impl ClipBox {
     }
 }
 
-/// The convex hull of `places`, which are sorted for it; no three corners in a line. `None` where it has
-/// more than [`MOST_HULL_CORNERS`], which squares about eight places have not.
-fn convex_hull(places: &mut [[i32; 2]]) -> Option<Hull> {
+/// The convex hull of eight squares, in fact rectangles of half-sides `half` ≥ 1 about `middles`: the
+/// Minkowski sum of the middles' hull and one of them. No three corners are in a line, and the first is
+/// the leftmost, of those the topmost.
+///
+/// The edges of such a sum are those of both, in the order of their directions, and edges of one direction
+/// become one (de Berg, Cheong, van Kreveld & Overmars 2008, *Computational Geometry*, section 13.3). So
+/// eight places are sorted, not thirty-two.
+fn dilated_hull(middles: &mut [[i32; 2]; 8], half: [i32; 2]) -> Hull {
+    let inner = convex_hull(middles);
+    let square =
+        [[2 * half[0], 0], [0, 2 * half[1]], [-2 * half[0], 0], [0, -2 * half[1]]].into_iter();
+    let mut square = square.zip([1, 3, 5, 7]).peekable();
+    let first = inner.corners[0];
+    let mut at = [first[0] - half[0], first[1] - half[1]];
+    let mut sum = Hull::EMPTY;
+    let mut edge = |along: [i32; 2]| {
+        // Eight and four at most.
+        let room = sum.push(at);
+        debug_assert!(room, "a hull of eight places and a square have twelve edges");
+        at = [at[0] + along[0], at[1] + along[1]];
+    };
+    let corners = inner.corners();
+    let ends = corners.iter().cycle().skip(1);
+    // One place alone has no edges.
+    for (from, to) in corners.iter().zip(ends).take_while(|(from, to)| from != to) {
+        let mut along = [to[0] - from[0], to[1] - from[1]];
+        let octant = octant(along);
+        while let Some((side, _)) = square.next_if(|&(_, at)| at < octant) {
+            edge(side);
+        }
+        if let Some((side, _)) = square.next_if(|&(_, at)| at == octant) {
+            along = [along[0] + side[0], along[1] + side[1]];
+        }
+        edge(along);
+    }
+    square.for_each(|(side, _)| edge(side));
+    sum
+}
+
+/// Where a direction stands on the way round that starts, and ends, at [0, −1]: odd for the axes, even
+/// between them.
+fn octant([x, y]: [i32; 2]) -> u32 {
+    match (x.signum(), y.signum()) {
+        (1, -1) => 0,
+        (1, 0) => 1,
+        (1, _) => 2,
+        (0, 1) => 3,
+        (-1, 1) => 4,
+        (-1, 0) => 5,
+        (-1, _) => 6,
+        (_, _) => 7,
+    }
+}
+
+/// The convex hull of `places`, which are sorted for it; no three corners in a line, the least first. One
+/// or two corners where the places are one or in a line.
+fn convex_hull(places: &mut [[i32; 2]; 8]) -> Hull {
     places.sort_unstable();
     let turns = |a: [i32; 2], b: [i32; 2], c: [i32; 2]| {
         let along = |i: usize, to: [i32; 2]| i64::from(to[i]) - i64::from(a[i]);
         along(0, b) * along(1, c) - along(1, b) * along(0, c) > 0
     };
-    let mut chain: Vec<[i32; 2]> = Vec::with_capacity(2 * MOST_HULL_CORNERS);
     // The chain of one side from the first place to the last, then that of the other side back.
+    let (mut chain, mut len) = ([[0; 2]; 16], 0);
     let mut side = |place: [i32; 2], first: usize| {
-        while chain.len() >= first + 2
-            && !turns(chain[chain.len() - 2], chain[chain.len() - 1], place)
-        {
-            chain.pop();
+        while len >= first + 2 && !turns(chain[len - 2], chain[len - 1], place) {
+            len -= 1;
         }
-        chain.push(place);
-        chain.len()
+        chain[len] = place;
+        len += 1;
+        len
     };
-    let mut len = 0;
+    let mut turn = 0;
     for &place in &*places {
-        len = side(place, 0);
+        turn = side(place, 0) - 1;
     }
-    let turn = len - 1;
     for &place in places.iter().rev().skip(1) {
         side(place, turn);
     }
     // The first place ends the second chain as well.
-    chain.pop();
     let mut hull = Hull::EMPTY;
-    chain.into_iter().all(|corner| hull.push(corner)).then_some(hull)
+    for &corner in &chain[..len - 1] {
+        hull.push(corner);
+    }
+    hull
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// All that makes it the hull of the squares: it holds each of their corners, has no others, and
+        /// turns one way at every one. Places on a small grid fall together and in lines often.
+        #[test]
+        fn a_dilated_hull_is_that_of_the_squares(
+            middles in proptest::array::uniform8((-3_i32..4, -3_i32..4)),
+            spread in prop_oneof![Just(1), Just(1000), Just(1 << 26)],
+            half in (1_i32..5, 1_i32..5),
+        ) {
+            let middles = middles.map(|(x, y)| [x * spread, y * spread]);
+            let half = [half.0, half.1];
+            let hull = dilated_hull(&mut middles.clone(), half);
+            let signs = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
+            let places: Vec<[i32; 2]> = middles
+                .iter()
+                .flat_map(|at| signs.map(|s| [at[0] + s[0] * half[0], at[1] + s[1] * half[1]]))
+                .collect();
+            let corners = hull.corners();
+            prop_assert_eq!(corners.first(), places.iter().min());
+            for (i, &b) in corners.iter().enumerate() {
+                prop_assert!(places.contains(&b), "{b:?} is no corner of a square");
+                let (a, c) = (
+                    corners[(i + corners.len() - 1) % corners.len()],
+                    corners[(i + 1) % corners.len()],
+                );
+                let along = |axis: usize, from: [i32; 2], to: [i32; 2]| {
+                    i64::from(to[axis]) - i64::from(from[axis])
+                };
+                prop_assert!(
+                    along(0, a, b) * along(1, b, c) > along(1, a, b) * along(0, b, c),
+                    "no turn at {b:?} of {corners:?}"
+                );
+            }
+            for place in places {
+                prop_assert!(hull.holds(place), "{place:?} is outside of {corners:?}");
+            }
+        }
+    }
 }

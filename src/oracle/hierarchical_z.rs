@@ -16,7 +16,10 @@
 
 use std::marker::PhantomData;
 
+use plainsight_reference::Image;
+
 use super::batches::Batches;
+use super::maxima::farther;
 use super::{Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Sim, Stage};
 use crate::part::PartId;
 
@@ -94,17 +97,20 @@ impl Level {
     /// The next one up.
     fn halved<R: PyramidRules>(&self) -> Self {
         let (width, height) = (R::halved(self.width).max(1), R::halved(self.height).max(1));
+        let row_of = |row: usize| &self.texels[row * self.width..(row + 1) * self.width];
         let mut texels = Vec::with_capacity(width * height);
         for y in 0..height {
-            for x in 0..width {
-                let mut farthest = 0.0_f32;
-                for row in 2 * y..(2 * y + 2).min(self.height) {
-                    for column in 2 * x..(2 * x + 2).min(self.width) {
-                        farthest = farthest.max(self.texels[row * self.width + column]);
-                    }
-                }
-                texels.push(farthest);
-            }
+            let upper = row_of((2 * y).min(self.height - 1));
+            let lower = row_of((2 * y + 1).min(self.height - 1));
+            let ((upper, odd_above), (lower, odd_below)) =
+                (upper.as_chunks::<2>(), lower.as_chunks::<2>());
+            let most = |([a, b], [c, d]): (&[f32; 2], &[f32; 2])| {
+                farther(farther(*a, *b), farther(*c, *d))
+            };
+            texels.extend(upper.iter().zip(lower).map(most));
+            // The last column of an odd level, where the next one keeps it.
+            let odd = odd_above.iter().zip(odd_below).map(|(a, b)| farther(*a, *b));
+            texels.extend(odd.take(width - upper.len()));
         }
         Self { width, height, texels }
     }
@@ -163,7 +169,7 @@ impl<R: PyramidRules> HierarchicalZ<R> {
     fn build(&mut self) {
         let image = self.sim.image();
         let width = image.viewport().width as usize;
-        self.pyramid = Pyramid::new(width, image.depths().collect());
+        self.pyramid = Pyramid::new(width, image.depths());
         self.stale = false;
     }
 }
@@ -218,6 +224,10 @@ impl<R: PyramidRules> Oracle for HierarchicalZ<R> {
         self.sim.read_back()
     }
 
+    fn reference_image(&self) -> Option<&Image> {
+        self.sim.reference_image()
+    }
+
     fn redraw(&mut self, _: &[PartId]) -> Result<Option<ReadBack>, OracleError> {
         Ok(None)
     }
@@ -239,10 +249,13 @@ mod tests {
             far in proptest::collection::vec((0_usize..70, 0_usize..70, 0_u8..4), 0..6),
             corners in [0.0..1.0_f64, 0.0..1.0, 0.0..1.0, 0.0..1.0],
             depth in 0_u8..5,
+            reversed in proptest::bool::ANY,
         ) {
-            let mut depths = vec![0.0; width * height];
+            // Of forward depth, or of reversed depth as it is kept.
+            let least = if reversed { -1.0 } else { 0.0 };
+            let mut depths = vec![least; width * height];
             for (x, y, d) in far {
-                depths[y % height * width + x % width] = f32::from(d) / 4.0;
+                depths[y % height * width + x % width] = f32::from(d) / 4.0 + least;
             }
             let span = |a: f64, b: f64, side: usize| {
                 let low = (a.min(b) * side as f64) as u32;
@@ -250,7 +263,7 @@ mod tests {
             };
             let ((x0, x1), (y0, y1)) =
                 (span(corners[0], corners[1], width), span(corners[2], corners[3], height));
-            let depth = f32::from(depth) / 4.0;
+            let depth = f32::from(depth) / 4.0 + least;
             let pyramid = Pyramid::<Sound>::new(width, depths.clone());
             let any = |[x0, y0]: [u32; 2], [x1, y1]: [u32; 2]| {
                 (y0..y1).any(|y| (x0..x1).any(|x| depths[y as usize * width + x as usize] >= depth))

@@ -33,7 +33,7 @@ impl DepthRows<'_> {
 }
 
 /// The larger of two depths; they are never NaN, and unlike `f32::max` this is one instruction.
-fn farther(a: f32, b: f32) -> f32 {
+pub(super) fn farther(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
@@ -62,7 +62,7 @@ impl DepthMaxima {
             for left in (0..across).step_by(SIDE) {
                 let right = (left + SIDE).min(across);
                 let most = rows.chunks(across).map(|row| farthest(&row[left..right]));
-                self.blocks.push(most.fold(0.0, farther));
+                self.blocks.push(most.fold(f32::NEG_INFINITY, farther));
             }
         }
     }
@@ -123,15 +123,18 @@ mod tests {
             far in proptest::collection::vec((0_usize..150, 0_usize..150, 0_u8..4), 0..6),
             corners in [0.0..1.0_f64, 0.0..1.0, 0.0..1.0, 0.0..1.0],
             depth in 0_u8..5,
+            reversed in proptest::bool::ANY,
         ) {
             let stride = width + padding;
+            // Of forward depth, or of reversed depth as it is kept.
+            let least = if reversed { -1.0 } else { 0.0 };
             // What pads a row must not count.
             let mut samples = vec![1.0; stride * height];
             for y in 0..height {
-                samples[y * stride..y * stride + width].fill(0.0);
+                samples[y * stride..y * stride + width].fill(least);
             }
             for (x, y, d) in far {
-                samples[y % height * stride + x % width] = f32::from(d) / 4.0;
+                samples[y % height * stride + x % width] = f32::from(d) / 4.0 + least;
             }
             let image = DepthRows { samples: &samples, stride, width, height };
             let span = |a: f64, b: f64, side: usize| {
@@ -140,7 +143,7 @@ mod tests {
             };
             let ((x0, x1), (y0, y1)) =
                 (span(corners[0], corners[1], width), span(corners[2], corners[3], height));
-            let depth = f32::from(depth) / 4.0;
+            let depth = f32::from(depth) / 4.0 + least;
             let plain = (y0..y1)
                 .any(|y| image.row(y as usize)[x0 as usize..x1 as usize].iter().any(|&d| d >= depth));
             let mut maxima = DepthMaxima::default();

@@ -24,8 +24,8 @@ pub mod wgpu;
 
 use std::sync::Arc;
 
-use plainsight_reference::Tolerance;
 use plainsight_reference::fast::Options;
+use plainsight_reference::{Image, Tolerance};
 
 use crate::math::{HULL_SUBPIXELS, Hull};
 use crate::part::{PartId, Partition};
@@ -273,6 +273,12 @@ pub trait Oracle {
     /// # Errors
     /// Where the device is lost.
     fn read_back(&mut self) -> Result<Option<ReadBack>, OracleError>;
+
+    /// What the frame's own draws left, where the oracle is a reference renderer, complete after
+    /// [`Oracle::submit`]: then nobody need render the drawn parts once more to compare them.
+    fn reference_image(&self) -> Option<&Image> {
+        None
+    }
 
     /// Draws `parts` (ascending) from scratch in draw-index order under the frame's matrices, into
     /// images of its own, and reads depth and part ids back. The frame's own images stay. `None`

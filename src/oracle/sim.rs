@@ -174,7 +174,11 @@ impl Oracle for Sim {
 
     fn read_back(&mut self) -> Result<Option<ReadBack>, OracleError> {
         self.flush();
-        Ok(Some(ReadBack { depth: self.image.depths().collect(), parts: None }))
+        Ok(Some(ReadBack { depth: self.image.depths(), parts: None }))
+    }
+
+    fn reference_image(&self) -> Option<&Image> {
+        Some(&self.image)
     }
 
     fn redraw(&mut self, _: &[PartId]) -> Result<Option<ReadBack>, OracleError> {

@@ -11,6 +11,8 @@
 
 use std::collections::VecDeque;
 
+use plainsight_reference::Image;
+
 use super::{
     Answer, CostModel, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Sim, Stage,
 };
@@ -245,6 +247,10 @@ impl Oracle for Simulated {
     fn read_back(&mut self) -> Result<Option<ReadBack>, OracleError> {
         self.still_there()?;
         self.sim.read_back()
+    }
+
+    fn reference_image(&self) -> Option<&Image> {
+        self.sim.reference_image()
     }
 
     fn redraw(&mut self, parts: &[PartId]) -> Result<Option<ReadBack>, OracleError> {

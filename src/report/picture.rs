@@ -30,7 +30,8 @@ pub fn depth_picture(image: &Image) -> RgbImage {
     let [_, far] = image.order().range();
     // 1 at the near plane in either order, and about near over distance.
     let shade = |depth: f32| libm::sqrt(libm::sqrt(f64::from(far) - f64::from(depth)));
-    let drawn = || image.depths().filter(|&depth| depth < far).map(shade);
+    let depths = image.depths();
+    let drawn = || depths.iter().copied().filter(|&depth| depth < far).map(shade);
     let (low, high) = drawn().fold((f64::INFINITY, 0.0_f64), |(l, h), s| (l.min(s), h.max(s)));
     let span = if high > low { high - low } else { 1.0 };
     paint(image, |sample| {

@@ -135,9 +135,13 @@ pub fn run(
     let traces = |lane: &Lane<'_>| Trace { lane: lane.info.clone(), frames: Vec::new() };
     let mut traces: Vec<Trace> = lanes.iter().map(traces).collect();
     let mut cullers: Vec<_> = lanes.iter().map(|lane| (lane.culler)()).collect();
+    let mut last: Option<Truth> = None;
     for moment in Moment::all(world, frames) {
         let state = FrameState::at(world, moment);
-        let truth = Truth::of(world, &state);
+        let truth = match last.take() {
+            Some(last) => last.next(world, &state),
+            None => Truth::of(world, &state),
+        };
         let (mut everything, mut bound): (Option<ReadBack>, Option<u64>) = (None, None);
         for ((lane, culler), trace) in lanes.iter_mut().zip(&mut cullers).zip(&mut traces) {
             let shot = shoot(world, &state, truth_facts(&truth), lane, culler.as_mut())?;
@@ -152,6 +156,7 @@ pub fn run(
                 return Err(RunError::Interrupted);
             }
         }
+        last = Some(truth);
     }
     run_again(world, repeat, lanes, &mut traces, tick)?;
     Ok(traces)
@@ -214,11 +219,17 @@ fn shoot(
         panic!("{} broke its invariants in {}: {broken}", culler.name(), state.moment);
     }
     let (memory, clock) = (oracle.memory(), oracle.clock());
-    let own = oracle.read_back()?;
     let words = |image: &ReadBack| {
         image.depth.iter().fold(HASH_START, |hash, depth| fold(hash, u64::from(depth.to_bits())))
     };
-    let image_hash = own.as_ref().map_or(0, words);
+    let (own, image_hash) = match oracle.reference_image() {
+        Some(image) => (None, image.hash()),
+        None => {
+            let own = oracle.read_back()?;
+            let hash = own.as_ref().map_or(0, words);
+            (own, hash)
+        }
+    };
     let drawn_parts = drawn.len() as u32;
     let trace = FrameTrace {
         moment: state.moment,
@@ -256,9 +267,10 @@ fn observe(
     };
     let counts: Counts = shot.trace.counts;
     let (drawn, fates) = (shot.drawn.as_slice(), OnceCell::new());
-    let record =
-        FrameRecord { lane: &lane.info, world, state, truth, drawn, counts, device, fates };
-    lane.observer.frame(&record);
+    let (lane, observer, reference) =
+        (&lane.info, &mut *lane.observer, lane.oracle.reference_image());
+    let record = FrameRecord { lane, world, state, truth, drawn, counts, device, reference, fates };
+    observer.frame(&record);
     Ok(())
 }
 

@@ -25,12 +25,16 @@ pub fn told<E>(
     observer: &mut dyn Observer,
 ) -> Result<Trace, E> {
     let mut trace = Trace { lane: info.clone(), frames: Vec::new() };
+    let mut last: Option<Truth> = None;
     for moment in Moment::all(world, frames) {
         let state = FrameState::at(world, moment);
         let mut drawn = says(&state)?;
         drawn.sort_unstable();
         drawn.dedup();
-        let truth = Truth::of(world, &state);
+        let truth = match last.take() {
+            Some(last) => last.next(world, &state),
+            None => Truth::of(world, &state),
+        };
         let triangles = |part: &PartId| u64::from(world.partition.part(*part).triangle_count);
         let counts = Counts { triangles: drawn.iter().map(triangles).sum(), ..Counts::default() };
         let events_hash = drawn.iter().fold(HASH_START, |hash, part| fold(hash, part.0.into()));
@@ -50,9 +54,20 @@ pub fn told<E>(
             wall_ns: 0,
             visible_wall_ns: None,
         });
-        let (lane, state, truth, drawn) = (info, &state, &truth, drawn.as_slice());
+        let (lane, state, drawn) = (info, &state, drawn.as_slice());
         let (device, fates) = (None, OnceCell::new());
-        observer.frame(&FrameRecord { lane, world, state, truth, drawn, counts, device, fates });
+        observer.frame(&FrameRecord {
+            lane,
+            world,
+            state,
+            truth: &truth,
+            drawn,
+            counts,
+            device,
+            reference: None,
+            fates,
+        });
+        last = Some(truth);
     }
     Ok(trace)
 }

@@ -3,7 +3,7 @@
 use std::cell::OnceCell;
 use std::fmt;
 
-use plainsight_reference::Fates;
+use plainsight_reference::{Fates, Image};
 
 use super::{FrameState, HASH_START, LaneInfo, Truth, World, fates_of_parts, fold};
 use crate::cull::{Counts, Situations};
@@ -58,6 +58,8 @@ pub struct FrameRecord<'a> {
     pub counts: Counts,
     /// What a real device drew; `None` where none did.
     pub device: Option<DeviceImages<'a>>,
+    /// What the lane's oracle drew, where that is a reference renderer.
+    pub reference: Option<&'a Image>,
     pub(super) fates: OnceCell<Fates>,
 }
 
@@ -93,7 +95,8 @@ pub struct FrameTrace {
     pub clock: Option<Clock>,
     /// Hash of the truth's image.
     pub truth_hash: u64,
-    /// Hash of the depth that the culler's own draws left; 0 where no image is kept.
+    /// Hash of what the culler's own draws left: a reference renderer's image, a device's depth; 0 where no
+    /// image is kept.
     pub image_hash: u64,
     /// Wall time of the culler's frame, device included, in nanoseconds; the lower median where the
     /// frame was run several times. Never compared.

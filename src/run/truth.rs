@@ -5,7 +5,7 @@ use plainsight_reference::{Draw, Fates, Image, Tolerance, fast, fates};
 
 use super::{FrameState, World};
 use crate::oracle::{part_draw, part_instance};
-use crate::part::{PartId, PartitionKnobs};
+use crate::part::{ObjectId, PartId, PartitionKnobs};
 
 /// What the reference says of one frame.
 pub struct Truth {
@@ -25,20 +25,35 @@ impl Truth {
     /// Renders every part of the frame.
     #[must_use]
     pub fn of(world: &World, state: &FrameState) -> Self {
-        let mut image = world.image();
+        Self::into_room(world, state, world.image(), Vec::new())
+    }
+
+    /// The same of another frame of the same world, in the memory of this one.
+    #[must_use]
+    pub fn next(self, world: &World, state: &FrameState) -> Self {
+        Self::into_room(world, state, self.image, self.visible_pixels)
+    }
+
+    fn into_room(
+        world: &World,
+        state: &FrameState,
+        mut image: Image,
+        mut visible_pixels: Vec<u32>,
+    ) -> Self {
         let all: Vec<PartId> = (0..world.partition.part_count()).map(PartId).collect();
         render(world, state, &all, &mut image);
-        let mut visible_pixels = vec![0_u32; all.len()];
-        // Neighbouring samples mostly show one triangle.
-        let mut last = None;
-        for draw in image.draw_indices().flatten() {
-            let part = match last {
-                Some((same, part)) if same == draw => part,
-                _ => world.partition.part_of_draw(draw),
-            };
-            last = Some((draw, part));
-            visible_pixels[part.0 as usize] += 1;
-        }
+        visible_pixels.clear();
+        visible_pixels.resize(all.len(), 0);
+        // Neighbouring samples mostly show one triangle. (`for_each` goes through the image's pieces one by
+        // one; a loop over the iterator would ask for the piece at every sample.)
+        let (mut last, mut near) = ((u32::MAX, 0), ObjectId(0));
+        image.draw_indices().flatten().for_each(|draw| {
+            if draw != last.0 {
+                let part = world.partition.part_of_draw_near(draw, &mut near);
+                last = (draw, part.0 as usize);
+            }
+            visible_pixels[last.1] += 1;
+        });
         let visible = || (0..).zip(&visible_pixels).filter(|&(_, &pixels)| pixels > 0);
         let visible_parts = visible().count() as u32;
         let triangles = |(part, _)| u64::from(world.partition.part(PartId(part)).triangle_count);

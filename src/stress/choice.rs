@@ -85,8 +85,10 @@ impl Choice {
         };
         let frames = picture.pick(&[SWARM.frames, SWARM.frames, SWARM.frames, 3, 24]);
         let mut cut = Stream::new(seed, "cut");
+        // Small leaves make thousands of parts, and most of a sweep's time: one world in eight has them.
+        let usual = SWARM.leaf_triangles;
         let partition = PartitionKnobs {
-            leaf_triangles: cut.pick(&[SWARM.leaf_triangles, SWARM.leaf_triangles, 7, 1000]),
+            leaf_triangles: cut.pick(&[usual, usual, usual, usual, usual, 1000, 1000, 7]),
             crossing: if cut.below(4) == 0 { Crossing::Whole } else { Crossing::Split },
         };
         let mut culler = Stream::new(seed, "culler");
