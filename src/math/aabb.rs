@@ -118,3 +118,75 @@ impl Aabb {
         out.grown(magnitude * TRANSFORM_MARGIN)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn aabb(min: [f64; 3], max: [f64; 3]) -> Aabb {
+        Aabb::new(DVec3::from_array(min), DVec3::from_array(max))
+    }
+
+    #[test]
+    fn empty_is_what_holds_no_point() {
+        assert!(Aabb::EMPTY.is_empty());
+        assert!(!aabb([1.0; 3], [1.0; 3]).is_empty(), "a point is a box");
+        for axis in 0..3 {
+            let mut max = [2.0; 3];
+            max[axis] = 0.5;
+            assert!(aabb([1.0; 3], max).is_empty(), "inverted along {axis}");
+            max[axis] = f64::NAN;
+            assert!(aabb([1.0; 3], max).is_empty(), "not a number along {axis}");
+        }
+    }
+
+    #[test]
+    fn boxes_are_closed() {
+        let unit = aabb([0.0; 3], [1.0; 3]);
+        assert!(unit.contains(&unit) && unit.contains(&Aabb::EMPTY));
+        assert!(Aabb::EMPTY.contains(&Aabb::EMPTY) && !Aabb::EMPTY.contains(&unit));
+        for axis in 0..3 {
+            for (end, beyond) in [(0.0, -1e-9), (1.0, 1.0 + 1e-9)] {
+                let mut point = [0.5; 3];
+                point[axis] = end;
+                assert!(unit.contains_point(DVec3::from_array(point)), "on a face");
+                point[axis] = beyond;
+                let beyond = DVec3::from_array(point);
+                assert!(!unit.contains_point(beyond), "{beyond}");
+                let reaching = unit.union(&Aabb::new(beyond, beyond));
+                assert!(!unit.contains(&reaching) && reaching.contains(&unit), "{beyond}");
+            }
+        }
+    }
+
+    #[test]
+    fn middle_size_reach_and_corners() {
+        let aabb = aabb([-7.0, 2.0, 3.0], [5.0, 4.0, 8.0]);
+        assert_eq!(aabb.center(), DVec3::new(-1.0, 3.0, 5.5));
+        assert_eq!(aabb.size(), DVec3::new(12.0, 2.0, 5.0));
+        assert_eq!(aabb.max_abs(), DVec3::new(7.0, 4.0, 8.0));
+        let corners = aabb.corners();
+        assert_eq!(corners[0], aabb.min);
+        assert_eq!(corners[1], DVec3::new(5.0, 2.0, 3.0), "bit 0 is x");
+        assert_eq!(corners[2], DVec3::new(-7.0, 4.0, 3.0), "bit 1 is y");
+        assert_eq!(corners[4], DVec3::new(-7.0, 2.0, 8.0), "bit 2 is z");
+        assert_eq!(corners[7], aabb.max);
+    }
+
+    /// The margin is eight units of 2⁻⁵³ of the sum of absolute terms, on each axis.
+    #[test]
+    fn a_transformed_box_is_rounded_outward_by_its_margin() {
+        assert_eq!(TRANSFORM_MARGIN, 8.0 * libm::pow(2.0, -53.0));
+        let matrix = DMat4::from_cols_array_2d(&[
+            [0.0, -2.0, 0.0, 0.0],
+            [3.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, -5.0, 0.0],
+            [7.0, -11.0, 13.0, 1.0],
+        ]);
+        let moved = aabb([1.0, 2.0, 3.0], [4.0, 6.0, 8.0]).transformed(&matrix);
+        let sums = DVec3::new(18.0 + 7.0, 8.0 + 11.0, 40.0 + 13.0) * TRANSFORM_MARGIN;
+        assert_eq!(moved.min, DVec3::new(13.0, -19.0, -27.0) - sums);
+        assert_eq!(moved.max, DVec3::new(25.0, -13.0, -2.0) + sums);
+        assert!(Aabb::EMPTY.transformed(&matrix).is_empty());
+    }
+}

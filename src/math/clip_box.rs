@@ -269,3 +269,150 @@ pub(super) fn floor_f32(value: f64) -> f32 {
     let rounded = value as f32;
     if f64::from(rounded) > value { rounded.next_down() } else { rounded }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FORWARD: DepthOrder = DepthOrder::Forward;
+
+    /// All corners in one place.
+    fn point(clip: [f64; 4], error: [f64; 4], order: DepthOrder) -> ClipBox {
+        ClipBox { corners: [DVec4::from_array(clip); 8], error, order }
+    }
+
+    #[test]
+    fn constants_are_those_of_the_derivation() {
+        let power = |exponent: f64| libm::pow(2.0, exponent);
+        assert_eq!(RECTANGLE_DILATION_PIXELS, 2.0 * power(-4.0));
+        assert_eq!(DEPTH_ROUNDING, 6.0 * power(-24.0));
+        assert_eq!(CORNER_GAMMA, 8.0 * power(-53.0));
+    }
+
+    #[test]
+    fn rectangles_that_touch_share_no_pixel() {
+        let one = PixelRectangle { min: [2, 3], max: [5, 7] };
+        assert!(one.overlaps(&one));
+        let at = |min: [u32; 2], max: [u32; 2]| {
+            let other = PixelRectangle { min, max };
+            assert_eq!(one.overlaps(&other), other.overlaps(&one));
+            one.overlaps(&other)
+        };
+        assert!(at([4, 6], [9, 9]) && at([0, 0], [3, 4]) && at([0, 6], [3, 9]));
+        assert!(!at([5, 3], [9, 7]) && !at([0, 3], [2, 7]), "side by side");
+        assert!(!at([2, 7], [5, 9]) && !at([2, 0], [5, 3]), "one above the other");
+        assert!(!at([5, 7], [9, 9]), "corner to corner");
+    }
+
+    /// A box is beyond a plane if it is by more than what its error adds there: at the sum it is not.
+    /// Errors are powers of two, so that all sums are exact.
+    #[test]
+    fn every_plane_has_its_errors() {
+        let errors = [0.125, 0.25, 0.5, 1.0].map(|e| e / 1024.0);
+        let [ex, ey, ez, ew] = errors;
+        let least = 1.0 / (1_u64 << 40) as f64;
+        let both = [FORWARD, DepthOrder::Reversed];
+        for order in both {
+            let middle = if order == FORWARD { 0.5 } else { -0.5 };
+            let mut sides = vec![
+                (FrustumPlane::Left, 0, -1.0, ex + ew),
+                (FrustumPlane::Right, 0, 1.0, ex + ew),
+                (FrustumPlane::Bottom, 1, -1.0, ey + ew),
+                (FrustumPlane::Top, 1, 1.0, ey + ew),
+            ];
+            sides.extend(match order {
+                DepthOrder::Forward => {
+                    [(FrustumPlane::Near, 2, 0.0, ez), (FrustumPlane::Far, 2, 1.0, ez + ew)]
+                }
+                DepthOrder::Reversed => {
+                    [(FrustumPlane::Near, 2, -1.0, ez + ew), (FrustumPlane::Far, 2, 0.0, ez)]
+                }
+            });
+            for (plane, axis, at, margin) in sides {
+                let out = if axis == 2 && plane == FrustumPlane::Near { -1.0 } else { 1.0 };
+                let out = if at < 0.0 { -1.0 } else { out };
+                let beyond = |by: f64| {
+                    let mut clip = [0.0, 0.0, middle, 1.0];
+                    clip[axis] = at + out * by;
+                    point(clip, errors, order).beyond()
+                };
+                assert_eq!(beyond(margin + least), Some(plane), "{order:?} over");
+                assert_eq!(beyond(margin), None, "{order:?} {plane:?} at");
+                assert_eq!(beyond(margin - least), None, "{order:?} {plane:?} under");
+            }
+        }
+    }
+
+    /// Beside samples on one axis alone: on no sample.
+    #[test]
+    fn a_box_between_rows_is_nowhere() {
+        let thin = |axis: usize| {
+            let mut corners = [DVec4::new(-0.5, -0.5, 0.5, 1.0); 8];
+            corners[7] = DVec4::new(0.5, 0.5, 0.5, 1.0);
+            // Both ends on the line between two pixels of ten.
+            corners.iter_mut().for_each(|corner| corner[axis] = 0.2);
+            ClipBox { corners, error: [0.0; 4], order: FORWARD }.project(10, 10)
+        };
+        assert_eq!(thin(0), Projection::Nowhere);
+        assert_eq!(thin(1), Projection::Nowhere);
+    }
+
+    /// The nearest depth gives way to both errors over the smallest w.
+    #[test]
+    fn the_nearest_depth_gives_way_to_the_errors() {
+        let [ez, ew] = [0.0625, 0.125];
+        let clip = [0.0, 0.0, 1.0, 2.0];
+        let of = |order: DepthOrder, z: f64| {
+            let at = point([clip[0], clip[1], z, clip[3]], [0.0, 0.0, ez, ew], order);
+            match at.project_with(5, 5, &Margins { depth: 0.0, ..Margins::PROVEN }) {
+                Projection::Within { depth, .. } => f64::from(depth),
+                other => panic!("{other:?}"),
+            }
+        };
+        let w_min = 2.0 - ew;
+        assert_eq!(of(FORWARD, 1.0), f64::from(floor_f32(0.5 - (ez + ew) / w_min)));
+        let reversed = floor_f32(-0.5 - (ez + 0.5 * ew) / w_min);
+        assert_eq!(of(DepthOrder::Reversed, -1.0), f64::from(reversed), "a share of w's");
+    }
+
+    /// The window is that of the smallest w and of what is wholly inside the near plane, errors included.
+    #[test]
+    fn what_may_reach_the_eye_has_no_window() {
+        let seen = |w: f64, z: f64, error: [f64; 4], order: DepthOrder| {
+            point([0.0, 0.0, z, w], error, order).window(8, 8).is_some()
+        };
+        let w_error = [0.0, 0.0, 0.0, 0.25];
+        assert!(seen(0.375, 0.125, w_error, FORWARD));
+        assert!(!seen(0.25, 0.125, w_error, FORWARD), "w may be zero");
+        assert!(!seen(0.125, 0.125, w_error, FORWARD), "w may be below zero");
+        let z_error = [0.0, 0.0, 0.25, 0.0];
+        assert!(seen(1.0, 0.375, z_error, FORWARD));
+        assert!(!seen(1.0, 0.25, z_error, FORWARD), "it may touch the plane");
+        assert!(!seen(1.0, 0.125, z_error, FORWARD), "it may reach beyond");
+        let both = [0.0, 0.0, 0.125, 0.125];
+        assert!(seen(1.0, -0.625, both, DepthOrder::Reversed));
+        assert!(!seen(1.0, -0.75, both, DepthOrder::Reversed));
+        assert!(!seen(1.0, -0.875, both, DepthOrder::Reversed));
+    }
+
+    /// The transform bound is that of x over w: its own error, and w's times the ratio, over the smallest w.
+    #[test]
+    fn the_window_moves_by_the_errors() {
+        let at = point([1.0, -0.5, 0.5, 2.0], [0.25, 0.125, 0.0, 0.5], FORWARD);
+        let window = at.window(8, 4).unwrap();
+        assert_eq!(window.corners[0], [6.0, 2.5]);
+        assert_eq!(
+            window.bound,
+            [(0.25 + 0.5 * 0.5) / 1.5 * 4.0, (0.125 + 0.25 * 0.5) / 1.5 * 2.0]
+        );
+    }
+
+    #[test]
+    fn floors_are_the_largest_below() {
+        assert_eq!(floor_f32(0.5), 0.5);
+        for value in [0.1, -0.1, 1.0 / 3.0, 1.0 - 1e-12] {
+            let floor = floor_f32(value);
+            assert!(f64::from(floor) <= value && f64::from(floor.next_up()) > value, "{value}");
+        }
+    }
+}

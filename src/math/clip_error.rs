@@ -84,6 +84,55 @@ pub fn rounded_clip_matrix(clip_from_object: &DMat4) -> [f32; 16] {
 mod tests {
     use super::*;
 
+    fn power(exponent: i32) -> f64 {
+        libm::pow(2.0, f64::from(exponent))
+    }
+
+    #[test]
+    fn constants_are_those_of_the_derivation() {
+        let gamma = |n: f64, u: f64| n * u / (1.0 - n * u);
+        assert_eq!(ROUNDINGS, 23.0);
+        assert_eq!(CLIP_ERROR_GAMMA, gamma(23.0, power(-24)));
+        assert_eq!(COMPOSITION_GAMMA, gamma(8.0, power(-53)));
+        assert_eq!(UNDERFLOW, power(-120));
+    }
+
+    /// Each of the three terms alone, on every coordinate.
+    #[test]
+    fn the_bound_is_the_sum_of_its_terms() {
+        let reach = DVec3::new(2.0, 3.0, 5.0);
+        let nothing = ClipError::of(&DMat4::ZERO, &DMat4::ZERO, reach);
+        assert_eq!(nothing.bound, [11.0 * UNDERFLOW; 4], "what is flushed: 2 + 3 + 5 + 1");
+        // Row i of the one is (i, −i, 0, 0) and both upper rows of the other are (7, 11, 13, 17): the
+        // product cancels to nothing, the absolute one is 2i (7·2 + 11·3 + 13·5 + 17).
+        let rows = [1.0, 2.0, 3.0, 4.0];
+        let clip = DMat4::from_cols_array_2d(&[rows, rows.map(|row| -row), [0.0; 4], [0.0; 4]]);
+        let world = DMat4::from_cols_array_2d(
+            &[7.0, 11.0, 13.0, 17.0].map(|entry| [entry, entry, 0.0, 0.0]),
+        );
+        let cancelled = ClipError::of(&clip, &world, reach).bound;
+        assert_eq!(cancelled, rows.map(|i| COMPOSITION_GAMMA * (2.0 * i * 129.0)));
+        // The product as it is, by far the largest: with one column of the first, nothing cancels.
+        let clip = DMat4::from_cols_array_2d(&[rows, [0.0; 4], [0.0; 4], [0.0; 4]]);
+        let whole = ClipError::of(&clip, &world, reach).bound;
+        assert_eq!(
+            whole,
+            rows.map(|i| CLIP_ERROR_GAMMA * (i * 129.0) + COMPOSITION_GAMMA * (i * 129.0))
+        );
+    }
+
+    #[test]
+    fn the_larger_bound_holds_for_both() {
+        let (a, b) =
+            (ClipError { bound: [1.0, 4.0, 2.0, 0.0] }, ClipError { bound: [3.0, 2.0, 2.0, 5.0] });
+        let both = ClipError { bound: [3.0, 4.0, 2.0, 5.0] };
+        assert_eq!((a.max(&b), b.max(&a)), (both, both));
+        assert_eq!(a.max(&ClipError::ZERO), a);
+        let nan = ClipError { bound: [f64::NAN; 4] };
+        assert!(nan.max(&a).bound.iter().all(|bound| bound.is_nan()), "NaN wins");
+        assert!(a.max(&nan).bound.iter().all(|bound| bound.is_nan()), "NaN wins");
+    }
+
     /// A huge mesh under a tiny scale: entries of the matrix are subnormal, or zero on a device that
     /// flushes them, while the products are not small at all.
     #[test]

@@ -319,9 +319,108 @@ fn convex_hull(places: &mut [[i32; 2]; 8]) -> Hull {
 
 #[cfg(test)]
 mod tests {
+    use glam::{DMat4, DVec3};
     use proptest::prelude::*;
 
     use super::*;
+    use crate::math::{Aabb, ClipError};
+
+    fn plain(min: [f64; 3], max: [f64; 3], matrix: &DMat4, order: DepthOrder) -> ClipBox {
+        let aabb = Aabb::new(DVec3::from_array(min), DVec3::from_array(max));
+        ClipBox::new(&aabb, matrix, &ClipError::ZERO, order)
+    }
+
+    fn all(side: u32) -> PixelRectangle {
+        PixelRectangle { min: [0, 0], max: [side, side] }
+    }
+
+    #[test]
+    fn constants_are_those_of_the_derivation() {
+        assert_eq!(FLAT_DEPTH_STEP, 8.0 * libm::pow(2.0, -24.0));
+        assert_eq!(HULL_DILATION_PIXELS, 0.25);
+    }
+
+    #[test]
+    fn a_square_has_its_area_and_room_for_twelve_corners() {
+        let mut square = dilated_hull(&mut [[7, 9]; 8], [3, 5]);
+        assert_eq!(square.corners(), [[4, 4], [10, 4], [10, 14], [4, 14]]);
+        assert_eq!(square.twice_area(), 120);
+        let pushed: Vec<bool> = (0..9).map(|i| square.push([i, -i])).collect();
+        assert_eq!(pushed.iter().filter(|pushed| **pushed).count(), 8);
+        assert!(!pushed[8] && square.corners().len() == MOST_HULL_CORNERS);
+    }
+
+    /// Corners on the line of the cut come once, the first and the last too.
+    #[test]
+    fn a_cut_leaves_no_corner_twice() {
+        let square = dilated_hull(&mut [[0, 0]; 8], [8, 8]);
+        let side = square.cut(1, 8, |at| at >= 8).unwrap();
+        assert_eq!(side.corners(), [[-8, 8], [8, 8]]);
+        let half = square.cut(1, 0, |at| at >= 0).unwrap();
+        assert_eq!(half.corners().len(), 4);
+        let mut middles = [[0, 0]; 8];
+        middles[0] = [100, 50];
+        let tip = dilated_hull(&mut middles, [1, 1]).cut(0, 101, |at| at >= 101).unwrap();
+        assert_eq!(tip.corners(), [[101, 49], [101, 51]]);
+        let triangle = Hull { corners: [[0; 2]; MOST_HULL_CORNERS], len: 1 };
+        assert_eq!(triangle.cut(0, 0, |at| at >= 0).unwrap().corners(), [[0, 0]]);
+    }
+
+    /// A quarter of a pixel is 64 sub-pixels, and half a one of the grid is rounded up.
+    #[test]
+    fn the_dilation_is_rounded_up_to_the_grid() {
+        let point = plain([0.0, 0.0, 0.5], [0.0, 0.0, 0.5], &DMat4::IDENTITY, DepthOrder::Forward);
+        match point.outline((8, 8), (all(8), 0.5)) {
+            Outline::Within { hull, .. } => {
+                assert_eq!(hull.corners(), [[959, 959], [1089, 959], [1089, 1089], [959, 1089]]);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// A corner whose square reaches beyond the farthest place has no outline.
+    #[test]
+    fn the_farthest_place_holds_the_whole_square() {
+        let at = |subpixels: f64| {
+            // Of a picture two pixels wide: one pixel a unit, from the middle.
+            let x = subpixels / f64::from(HULL_SUBPIXELS) - 1.0;
+            let point = plain([x, 0.0, 0.5], [x, 0.0, 0.5], &DMat4::IDENTITY, DepthOrder::Forward);
+            point.outline((2, 2), (all(2), 0.5))
+        };
+        assert_eq!(at(FARTHEST - 60.0), Outline::Rectangle);
+        assert_eq!(at(FARTHEST - 70.0), Outline::Nowhere, "it is beside the picture");
+    }
+
+    /// The corner of a rectangle within a slanted edge leaves a triangle, which can show.
+    #[test]
+    fn three_corners_are_an_outline() {
+        let turned = DMat4::from_rotation_z(std::f64::consts::FRAC_PI_4);
+        let diamond = plain([-0.5, -0.5, 0.5], [0.5, 0.5, 0.5], &turned, DepthOrder::Forward);
+        let corner = PixelRectangle { min: [66, 66], max: [100, 100] };
+        match diamond.outline((100, 100), (corner, 0.5)) {
+            Outline::Within { hull, .. } => assert_eq!(hull.corners().len(), 3),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Forward a step, reversed a share of the depth; never −0.
+    #[test]
+    fn the_depth_of_an_outline_is_before_the_rectangles() {
+        let depth_of = |depth: f32, order: DepthOrder| {
+            let z = f64::from(depth);
+            let z = if order == DepthOrder::Forward { z } else { z.min(-1e-6) };
+            let point = plain([0.0, 0.0, z], [0.0, 0.0, z], &DMat4::IDENTITY, order);
+            match point.outline((8, 8), (all(8), depth)) {
+                Outline::Within { depth, .. } => depth,
+                other => panic!("{other:?}"),
+            }
+        };
+        let forward = floor_f32(0.75 - FLAT_DEPTH_STEP);
+        assert_eq!(depth_of(0.75, DepthOrder::Forward), forward);
+        let reversed = floor_f32(-0.125 - 0.125 * FLAT_DEPTH_STEP);
+        assert_eq!(depth_of(-0.125, DepthOrder::Reversed), reversed);
+        assert_eq!(depth_of(-0.0, DepthOrder::Reversed).to_bits(), 0);
+    }
 
     proptest! {
         /// All that makes it the hull of the squares: it holds each of their corners, has no others, and

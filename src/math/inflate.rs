@@ -94,3 +94,66 @@ pub fn inflated_box_with(
     };
     outward.corners().into_iter().all(clear).then_some(outward)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x, y and z doubled, fourfold, eightfold; w is 1 everywhere.
+    fn scaled() -> DMat4 {
+        DMat4::from_scale(DVec3::new(2.0, 4.0, 8.0))
+    }
+
+    fn grown(error: [f64; 4], order: DepthOrder) -> Option<Aabb> {
+        let (low, high) = match order {
+            DepthOrder::Forward => (0.0625, 0.125),
+            DepthOrder::Reversed => (-0.0625, -0.03125),
+        };
+        let aabb = Aabb::new(DVec3::new(-0.25, -0.125, low), DVec3::new(0.125, 0.0625, high));
+        inflated_box(&aabb, &scaled(), &ClipError { bound: error }, (64, 32), order)
+    }
+
+    /// The derivation by hand, for a matrix whose inverse halves, quarters and takes an eighth.
+    #[test]
+    fn a_box_grows_by_what_was_derived() {
+        assert_eq!(BOX_DEPTH_SLACK, 64.0 * libm::pow(2.0, -24.0));
+        let error = [0.001, 0.002, 0.003, 0.004];
+        for (order, deepest, reach, low) in [
+            (DepthOrder::Forward, 1.0, 0.125, 0.0625),
+            (DepthOrder::Reversed, 0.5, 0.0625, -0.0625),
+        ] {
+            let grown = grown(error, order).expect("it is clear of the plane");
+            let pixel = |pixels: f64| 2.0 * BOX_DILATION_PIXELS / pixels;
+            let moved = [
+                2.0 * (0.001 + 0.004) + pixel(64.0),
+                2.0 * (0.002 + 0.004) + pixel(32.0),
+                2.0 * (0.003 + 0.004) + BOX_DEPTH_SLACK * deepest,
+            ];
+            let shift = 2.0 * 0.004 * INVERSE_SLACK;
+            let margin = |axis: usize, inverse: f64, reach: f64| {
+                (moved[axis] * inverse * INVERSE_SLACK + reach * shift) / (1.0 - shift)
+            };
+            let expected = [
+                -0.25 - margin(0, 0.5, 0.25),
+                -0.125 - margin(1, 0.25, 0.125),
+                low - margin(2, 0.125, reach),
+            ];
+            for (axis, (&value, expected)) in grown.min.to_array().iter().zip(expected).enumerate()
+            {
+                let ulp = f64::from(f32::EPSILON) * expected.abs();
+                assert!(value < expected && value > expected - 2.0 * ulp, "{order:?} axis {axis}");
+            }
+            let highest = 0.125 + margin(0, 0.5, 0.25);
+            assert!(grown.max.x > highest && grown.max.x < highest + 1e-6, "{order:?}");
+        }
+    }
+
+    /// A shift near one half reaches the eye whatever the box: no box then, nor beyond, nor of an error that
+    /// is not finite.
+    #[test]
+    fn too_large_a_shift_gives_no_box() {
+        let with = |ew: f64| grown([0.0, 0.0, 0.0, ew], DepthOrder::Forward).is_some();
+        assert!(with(0.004) && !with(0.12) && !with(0.13) && !with(1.0));
+        assert!(!with(f64::INFINITY) && !with(f64::NAN));
+    }
+}
