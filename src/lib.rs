@@ -20,6 +20,7 @@
 //! | [`check`] | observers of a run, one property per file | reports |
 //! | [`fault`] | real bug classes seeded in cullers, oracles, indexes and math; trials of the gate | reports |
 //! | [`stress`] | worlds picked by seeds, run and judged by the thousand; shrinking what fails | reports |
+//! | [`accuracy`] | what each knob loses and what it takes, beside the exact run | reports |
 //! | [`foreign`] | what cullers of other engines are told and what they answer | how it is judged, reports |
 //! | [`report`] | tables and pictures | |
 //! | [`cli`] | verbs; wires checks to runs | |
@@ -27,6 +28,7 @@
 //! A frame is a pure function of (scene, t). Nothing that is compared sees a clock, a hash order, an
 //! address or the timing of a thread.
 
+pub mod accuracy;
 pub mod check;
 pub mod cli;
 pub mod cull;

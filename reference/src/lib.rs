@@ -29,6 +29,7 @@
 //! 2²⁴, a product of two differences within 2⁴⁸, an edge value within 2⁴⁹: it fits i64 with room and is
 //! exact in f64 (53 bits).
 
+pub mod approximate;
 mod clip;
 mod draw;
 pub mod fast;

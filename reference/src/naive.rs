@@ -2,6 +2,7 @@
 //! from scratch at every sample. So simple that it is unlikely to be incorrect; what is faster must
 //! equal it bit for bit.
 
+use crate::clip::ClipVertex;
 use crate::draw::Draw;
 use crate::image::{Image, Viewport};
 use crate::order::DepthOrder;
@@ -11,7 +12,7 @@ use crate::window::{Oriented, SUBPIXELS, Window, depth, edge, top_left};
 pub fn draw(image: &mut Image, draw: &Draw<'_>) {
     let viewport = image.viewport();
     let order = image.order();
-    fragments(viewport, order, draw, |column, row, depth, id| {
+    fragments(viewport, order, draw, &Written, |column, row, depth, id| {
         image.lower(column, row, u64::from(order.key(depth)) << 32 | u64::from(id));
     });
 }
@@ -21,25 +22,47 @@ pub fn draw(image: &mut Image, draw: &Draw<'_>) {
 #[must_use]
 pub fn count(image: &Image, draw: &Draw<'_>) -> u64 {
     let mut passed = 0;
-    fragments(image.viewport(), image.order(), draw, |column, row, depth, _| {
+    fragments(image.viewport(), image.order(), draw, &Written, |column, row, depth, _| {
         let stored = (image.word_at(column, row) >> 32) as u32;
         passed += u64::from(image.order().key(depth) <= stored);
     });
     passed
 }
 
-fn fragments(
+/// The arithmetic of a renderer. [`Written`] is that of the raster rules; others exist to show what less or
+/// more of it changes.
+pub(crate) trait Arithmetic {
+    /// Clip coordinates of a vertex.
+    fn corner(&self, draw: &Draw<'_>, vertex: u32) -> ClipVertex {
+        draw.clip_vertex(vertex)
+    }
+
+    /// The depth at a sample (x, y), in sub-pixels, whose edge values are `e`.
+    fn depth(&self, triangle: &Oriented, e: [i64; 3], [x, y]: [i64; 2]) -> f32 {
+        let _ = (x, y);
+        depth(e.map(|e| e as f64), triangle.v.map(|v| v.z), triangle.area)
+    }
+}
+
+/// The raster rules.
+pub(crate) struct Written;
+
+impl Arithmetic for Written {}
+
+pub(crate) fn fragments(
     viewport: Viewport,
     order: DepthOrder,
     draw: &Draw<'_>,
+    arithmetic: &impl Arithmetic,
     mut emit: impl FnMut(usize, usize, f32, u32),
 ) {
     assert_eq!(draw.triangles.len(), draw.ranks.len(), "one rank a triangle");
     let window = Window::new(viewport, order);
     for (i, triangle) in draw.triangles.iter().enumerate() {
-        let corners = triangle.map(|vertex| draw.clip_vertex(vertex));
+        let corners = triangle.map(|vertex| arithmetic.corner(draw, vertex));
         let Some(polygon) = window.clipper.clip(corners) else { continue };
-        for Oriented { v, area } in window.fan(&polygon, draw.faces) {
+        for triangle in window.fan(&polygon, draw.faces) {
+            let v = triangle.v;
             let low = |at: [i32; 3]| {
                 (i64::from(at.into_iter().min().unwrap_or(0)) / SUBPIXELS - 1).max(0)
             };
@@ -58,7 +81,7 @@ fn fragments(
                         e[i] > 0 || (e[i] == 0 && top_left(opposite(i).0, opposite(i).1))
                     };
                     if (0..3).all(inside) {
-                        let depth = depth(e.map(|e| e as f64), v.map(|v| v.z), area);
+                        let depth = arithmetic.depth(&triangle, e, [x, y]);
                         emit(column as usize, row as usize, depth, draw.stored_id(i));
                     }
                 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use plainsight_reference::fast::{Options, SimdLevel};
 
+use super::accuracy::AccuracyArgs;
 use super::export::ExportArgs;
 use super::faults::FaultsArgs;
 use super::judge::JudgeArgs;
@@ -53,6 +54,8 @@ pub(super) enum Verb {
     Faults(FaultsArgs),
     /// Run worlds by the thousand, each picked by its seed, each judged by every check.
     Stress(StressArgs),
+    /// What accuracy costs in time: every knob in turn, what it loses beside what it takes.
+    Accuracy(AccuracyArgs),
     /// List scenes, cullers, oracles, indexes and devices.
     List,
 }

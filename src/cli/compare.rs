@@ -79,7 +79,7 @@ fn label(name: &str, named: &Named, args: &SceneArgs) -> String {
 }
 
 /// The folder, made if it is not there.
-fn folder(path: &Path) -> Result<PathBuf, CliError> {
+pub(super) fn folder(path: &Path) -> Result<PathBuf, CliError> {
     std::fs::create_dir_all(path)
         .map_err(|source| CliError::Write { path: path.display().to_string(), source })?;
     Ok(path.to_owned())

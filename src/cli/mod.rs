@@ -2,6 +2,7 @@
 //! that tests can drive it with cullers of their own. Results go to `out`, progress and talk to
 //! `talk`.
 
+mod accuracy;
 mod args;
 mod calibrate;
 mod compare;
@@ -112,6 +113,7 @@ pub fn main(
         args::Verb::Why(args) => why::why(&args, cullers, &mut streams),
         args::Verb::Faults(args) => faults::faults(&args, &mut streams),
         args::Verb::Stress(args) => stress::stress(&args, cullers, &mut streams),
+        args::Verb::Accuracy(args) => accuracy::accuracy(&args, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),
     };
     done.unwrap_or_else(|error| {

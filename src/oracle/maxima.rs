@@ -3,6 +3,8 @@
 //! device, for images that were read back (Greene, Kass & Miller 1993, section 3.2, with three levels).
 //! It must not know devices.
 
+use super::hierarchical_z::farther;
+
 /// Samples along a tile, and tiles along a block.
 const SIDE: usize = 8;
 
@@ -30,11 +32,6 @@ impl DepthRows<'_> {
     fn row(&self, y: usize) -> &[f32] {
         &self.samples[y * self.stride..y * self.stride + self.width]
     }
-}
-
-/// The larger of two depths; they are never NaN, and unlike `f32::max` this is one instruction.
-pub(super) fn farther(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 fn farthest(depths: &[f32]) -> f32 {

@@ -9,6 +9,7 @@
 //! asking order, so that no culler sees arrival times. An answer may err only towards "visible".
 
 mod always;
+mod approximate;
 mod batches;
 mod cost;
 mod fit;
@@ -32,6 +33,7 @@ use crate::part::{PartId, Partition};
 use crate::scene::{DepthOrder, Viewport};
 
 pub use always::Always;
+pub use approximate::{Approximate, BufferKnobs, DepthFormat};
 pub use cost::{Amounts, CostModel};
 pub use fit::{FitError, Measurement};
 pub use hierarchical_z::HierarchicalZ;

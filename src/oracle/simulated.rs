@@ -1,4 +1,4 @@
-//! The simulated device, whole: the reference rasterizer behind a command stream with a virtual clock.
+//! The simulated device, whole: the reference rasterizer (or another oracle) behind a command stream with a virtual clock.
 //! Draws and questions take the time that a cost model says, batches one after the other; answers come
 //! back after a latency drawn from a seed, so that a later batch may be back before an earlier one. A
 //! [`Schedule`] says what else the device does to its user: legally, some hidden answers come back as
@@ -93,7 +93,8 @@ struct Flight {
 
 /// The device.
 pub struct Simulated {
-    sim: Sim,
+    /// What answers.
+    sim: Box<dyn Oracle>,
     stage: Stage,
     model: CostModel,
     schedule: Schedule,
@@ -117,8 +118,14 @@ impl Simulated {
     /// Where the stage has not enough memory for its largest mesh.
     #[must_use]
     pub fn new(stage: Stage, model: CostModel, schedule: Schedule) -> Self {
+        Self::over(Box::new(Sim::new(stage.clone())), stage, model, schedule)
+    }
+
+    /// The same over another oracle than the reference, which answers at once.
+    #[must_use]
+    pub fn over(sim: Box<dyn Oracle>, stage: Stage, model: CostModel, schedule: Schedule) -> Self {
         Self {
-            sim: Sim::new(stage.clone()),
+            sim,
             stage,
             model,
             schedule,

@@ -2,15 +2,19 @@
 //! gates; they decide nothing.
 
 mod account;
+mod accuracy;
 mod chart;
 mod columns;
 mod comparison;
+mod drawing;
 mod junit;
 mod memory;
 mod picture;
 mod row;
+mod scatter;
 
 pub use account::{account_picture, decision_line, item_name, step_line, truth_line};
+pub use accuracy::{accuracy_chart, accuracy_table, renderer_table};
 pub use chart::{Chart, Series};
 pub use columns::wrapped;
 pub use comparison::{Comparison, Published, TABLE_1};
@@ -18,3 +22,4 @@ pub use junit::{JunitCase, junit};
 pub use memory::MemoryFigures;
 pub use picture::{Shown, depth_picture, difference_picture, part_picture, picture_png, top_view};
 pub use row::{JSON_SCHEMA, Row, table};
+pub use scatter::{Dot, Scatter};

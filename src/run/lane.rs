@@ -244,6 +244,7 @@ fn shoot(
         truth_hash,
         image_hash,
         wall_ns,
+        wall_range_ns: [wall_ns; 2],
         visible_wall_ns: None,
     };
     Ok(Shot { trace, drawn, own })
@@ -305,6 +306,7 @@ fn run_again(
         for (frame, mut walls) in trace.frames.iter_mut().zip(walls) {
             walls.sort_unstable();
             frame.wall_ns = walls[(walls.len() - 1) / 2];
+            frame.wall_range_ns = [walls[0], walls[walls.len() - 1]];
         }
     }
     Ok(())

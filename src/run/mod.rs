@@ -3,6 +3,7 @@
 //! It must not know the checks: an observer is anything that implements [`Observer`].
 
 mod account;
+mod approximation;
 mod calibrate;
 mod frame;
 mod lane;
@@ -11,6 +12,7 @@ mod trace;
 mod truth;
 
 pub use account::{Account, Made, PartTruth, Step, account};
+pub use approximation::{Arithmetic, Rendering, render_approximately};
 pub use calibrate::{Bench, CalibrationKnobs, Workload, frames_to_measure, measure, workloads};
 pub use frame::{FrameState, World};
 pub use lane::{Lane, LaneInfo, Observer, Repeat, RunError, run};

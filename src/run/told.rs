@@ -52,6 +52,7 @@ pub fn told<E>(
             truth_hash,
             image_hash: 0,
             wall_ns: 0,
+            wall_range_ns: [0; 2],
             visible_wall_ns: None,
         });
         let (lane, state, drawn) = (info, &state, drawn.as_slice());

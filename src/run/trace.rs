@@ -101,6 +101,8 @@ pub struct FrameTrace {
     /// Wall time of the culler's frame, device included, in nanoseconds; the lower median where the
     /// frame was run several times. Never compared.
     pub wall_ns: u64,
+    /// The least and the most of these times. Never compared.
+    pub wall_range_ns: [u64; 2],
     /// Wall time for the visible parts alone, in nanoseconds, where it was asked for. Never compared.
     pub visible_wall_ns: Option<u64>,
 }

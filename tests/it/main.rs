@@ -1,6 +1,7 @@
 //! All integration tests, one binary. `common` is the shared runner and seed table: every index,
 //! culler and oracle that is registered runs through it.
 
+mod accuracy;
 mod broken;
 mod cache;
 mod calibrate;

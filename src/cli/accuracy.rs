@@ -1,0 +1,189 @@
+//! `accuracy`: what accuracy costs in time, knob by knob.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::args::SceneArgs;
+use super::compare::folder;
+use super::progress::progress_bar;
+use super::run::{Named, catch_interrupt, interrupted, matching, pick_cost};
+use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use crate::accuracy::{KNOBS, Point, RendererPoint, findings, measure, renderers, settings};
+use crate::report::{accuracy_chart, accuracy_table, picture_png, renderer_table, wrapped};
+use crate::run::RunError;
+use crate::scene::{Scene, Viewport};
+
+/// Of the JSON lines.
+const VERSION: u32 = 1;
+/// What is looked at where nothing is said.
+const SCENES: [&str; 4] = ["bunnies", "city", "powerplant", "rooms"];
+/// The quick size: a scale, frames and a viewport of every scene.
+const QUICK_SCALE: f64 = 0.1;
+const QUICK_FRAMES: u32 = 16;
+const QUICK_VIEWPORT: Viewport = Viewport { width: 320, height: 240 };
+/// Pictures of a scene that `renderers` makes in a round, at most.
+const RENDERINGS: u64 = 6 * 4;
+
+#[derive(Args, Clone)]
+pub(super) struct AccuracyArgs {
+    /// Scenes by name (`hard/*`: all that begin so), or scene files (default: bunnies city powerplant
+    /// rooms, small and at 320x240).
+    #[arg(long, value_name = "NAME|FILE.toml", num_args = 1.., value_delimiter = ',')]
+    scene: Vec<String>,
+    /// Knobs to turn (default: all, and some pairs).
+    #[arg(long, value_name = "KNOB", num_args = 1.., value_delimiter = ',')]
+    knob: Vec<String>,
+    #[command(flatten)]
+    scene_args: SceneArgs,
+    /// How often everything is run; wall times are the medians, with the least and the most.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    rounds: u32,
+    /// One JSON object a setting on standard output in place of the tables.
+    #[arg(long)]
+    json: bool,
+    /// Folder for the charts (SVG and PNG), the points (JSON lines) and the findings (Markdown).
+    #[arg(long, value_name = "FOLDER", default_value = "accuracy")]
+    out: PathBuf,
+    /// Says what each knob does, and runs nothing.
+    #[arg(long)]
+    list: bool,
+}
+
+impl AccuracyArgs {
+    /// The scenes, in the quick size unless the user wants another.
+    fn scenes(&self) -> Result<Vec<Scene>, CliError> {
+        let names: Vec<&str> = match self.scene.is_empty() {
+            true => SCENES.to_vec(),
+            false => self.scene.iter().map(String::as_str).collect(),
+        };
+        let mut args = self.scene_args.clone();
+        if self.scene.is_empty() && !args.full_size {
+            args.scale = args.scale.or(Some(QUICK_SCALE));
+            args.frames = args.frames.or(Some(QUICK_FRAMES));
+            args.viewport = args.viewport.or(Some(QUICK_VIEWPORT));
+        }
+        let open = |name: &String| {
+            let scene = Named::open(name, &args)?.scene().clone();
+            Ok(Scene { leaf_triangles: args.leaf_triangles(&scene), ..scene })
+        };
+        matching(&names)?.iter().map(open).collect()
+    }
+}
+
+fn line<T: serde::Serialize>(kind: &str, point: &T) -> String {
+    let mut line = serde_json::to_value(point).unwrap_or(Value::Null);
+    line["plainsight"] = json!(kind);
+    line["version"] = json!(VERSION);
+    line.to_string()
+}
+
+/// One scene's figures.
+struct Figures {
+    points: Vec<Point>,
+    renderers: Vec<RendererPoint>,
+}
+
+pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+    if args.list {
+        for knob in KNOBS {
+            let values: Vec<&str> = knob.values.iter().map(|value| value.0).collect();
+            let text = format!("{:<13} {}: {}", knob.name, knob.summary, values.join(", "));
+            writeln!(streams.out, "{}", wrapped(&text, streams.width))?;
+        }
+        return Ok(EXIT_HELD);
+    }
+    let settings = settings(&args.knob).map_err(CliError::Usage)?;
+    let cost = pick_cost(&args.scene_args)?;
+    let scenes = args.scenes()?;
+    let out = folder(&args.out)?;
+    catch_interrupt();
+    let bar = progress_bar();
+    let rounds = u64::from(args.rounds);
+    let shots = |scene: &Scene| u64::from(scene.frames) * scene.cameras.len() as u64;
+    let of_scene = |scene: &Scene| (shots(scene) * settings.len() as u64 + RENDERINGS) * rounds;
+    bar.set_length(scenes.iter().map(of_scene).sum());
+    let mut lines: Vec<String> = Vec::new();
+    let mut words = format!("# What accuracy costs in time\n\nCost model: {}.\n", cost.name);
+    let mut failed = false;
+    for scene in &scenes {
+        bar.set_message(scene.name.clone());
+        let mut tick = || {
+            bar.inc(1);
+            !interrupted()
+        };
+        let points = measure(scene, &cost, args.rounds, &settings, &mut tick)?;
+        let renderers = renderers(scene, args.rounds, &mut tick);
+        if interrupted() {
+            return Err(RunError::Interrupted.into());
+        }
+        let figures = Figures { points, renderers };
+        failed |= bar.suspend(|| tell(args, scene, &figures, &mut words, streams))?;
+        lines.extend(figures.points.iter().map(|point| line("accuracy", point)));
+        lines.extend(figures.renderers.iter().map(|point| line("accuracy renderer", point)));
+        let chart = accuracy_chart(&figures.points);
+        let stem = scene.name.replace(|c: char| !(c.is_alphanumeric() || "._-".contains(c)), "_");
+        let path = |kind: &str| out.join(format!("{stem}.{kind}"));
+        OutFile::create(&path("svg"))?.finish(chart.svg().as_bytes())?;
+        OutFile::create(&path("png"))?.finish(&picture_png(&chart.png()))?;
+    }
+    bar.finish_and_clear();
+    OutFile::create(&out.join("points.jsonl"))?.finish((lines.join("\n") + "\n").as_bytes())?;
+    OutFile::create(&out.join("findings.md"))?.finish(words.as_bytes())?;
+    let to = if args.json { &mut streams.talk } else { &mut streams.out };
+    let word = if failed { "FAILED: a setting that takes nothing lost something" } else { "held" };
+    let seconds = bar.elapsed().as_secs_f64();
+    writeln!(
+        to,
+        "verdict: {word}; {} settings of {} scenes in {seconds:.1} s; charts, points and findings in {}",
+        settings.len(),
+        scenes.len(),
+        out.display()
+    )?;
+    Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
+}
+
+/// The tables of a scene and its findings; whether a sound setting lost anything.
+fn tell(
+    args: &AccuracyArgs,
+    scene: &Scene,
+    Figures { points, renderers }: &Figures,
+    words: &mut String,
+    streams: &mut Streams<'_>,
+) -> Result<bool, CliError> {
+    let Viewport { width, height } = scene.viewport;
+    let title = format!(
+        "{}, seed {}: {} objects, {} triangles, {} frames of {width}x{height}",
+        scene.name,
+        scene.seed,
+        scene.objects.len(),
+        scene.triangle_count(),
+        scene.frames
+    );
+    let findings = findings(points, renderers);
+    *words += &format!("\n## {title}\n\n{}\n", findings.join("\n\n"));
+    if args.json {
+        for point in points {
+            writeln!(streams.out, "{}", line("accuracy", point))?;
+        }
+        for point in renderers {
+            writeln!(streams.out, "{}", line("accuracy renderer", point))?;
+        }
+    } else {
+        let width = streams.width;
+        writeln!(streams.out, "{}\n{}", wrapped(&title, width), accuracy_table(points, width))?;
+        writeln!(streams.out, "{}", renderer_table(renderers, width))?;
+        for finding in &findings[..2.min(findings.len())] {
+            writeln!(streams.out, "{}\n", wrapped(finding, width))?;
+        }
+    }
+    let mut failed = false;
+    for point in points.iter().filter(|point| !point.failures.is_empty()) {
+        failed = true;
+        for failure in &point.failures {
+            writeln!(streams.talk, "{} {} {}: {failure}", scene.name, point.knob, point.value)?;
+        }
+    }
+    Ok(failed)
+}
