@@ -10,13 +10,16 @@
 //! | `knob` | the knobs, their values, the pairs |
 //! | `measure` | a setting run over a scene's frames |
 //! | `renderer` | renderers with less or more arithmetic than the reference |
+//! | `effects` | what each effect of a scene costs |
 //! | `findings` | the front, and what the figures say in words |
 
+mod effects;
 mod findings;
 mod knob;
 mod measure;
 mod renderer;
 
+pub use effects::{EffectPoint, effects};
 pub use findings::{findings, front};
 pub use knob::{KNOBS, Knob, PAIRS, Setting, Tuning, Value, settings};
 pub use measure::{Point, measure};

@@ -10,8 +10,13 @@ use super::compare::folder;
 use super::progress::progress_bar;
 use super::run::{Named, catch_interrupt, interrupted, matching, pick_cost};
 use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
-use crate::accuracy::{KNOBS, Point, RendererPoint, findings, measure, renderers, settings};
-use crate::report::{accuracy_chart, accuracy_table, picture_png, renderer_table, wrapped};
+use crate::accuracy::{
+    EffectPoint, KNOBS, Point, RendererPoint, effects, findings, measure, renderers, settings,
+};
+use crate::effect::EFFECTS;
+use crate::report::{
+    accuracy_chart, accuracy_table, effect_table, picture_png, renderer_table, wrapped,
+};
 use crate::run::RunError;
 use crate::scene::{Scene, Viewport};
 
@@ -83,6 +88,7 @@ fn line<T: serde::Serialize>(kind: &str, point: &T) -> String {
 struct Figures {
     points: Vec<Point>,
     renderers: Vec<RendererPoint>,
+    effects: Vec<EffectPoint>,
 }
 
 pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
@@ -102,7 +108,12 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
     let bar = progress_bar();
     let rounds = u64::from(args.rounds);
     let shots = |scene: &Scene| u64::from(scene.frames) * scene.cameras.len() as u64;
-    let of_scene = |scene: &Scene| (shots(scene) * settings.len() as u64 + RENDERINGS) * rounds;
+    let of_scene = |scene: &Scene| {
+        let declared = EFFECTS.iter().filter(|kind| (kind.declared)(scene)).count();
+        // As it is, without each, and without all.
+        let variants = 1 + declared + usize::from(declared > 1);
+        (shots(scene) * (settings.len() + variants) as u64 + RENDERINGS) * rounds
+    };
     bar.set_length(scenes.iter().map(of_scene).sum());
     let mut lines: Vec<String> = Vec::new();
     let mut words = format!("# What accuracy costs in time\n\nCost model: {}.\n", cost.name);
@@ -118,10 +129,12 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
         if interrupted() {
             return Err(RunError::Interrupted.into());
         }
-        let figures = Figures { points, renderers };
+        let effects = effects(scene, &cost, args.rounds, &mut tick)?;
+        let figures = Figures { points, renderers, effects };
         failed |= bar.suspend(|| tell(args, scene, &figures, &mut words, streams))?;
         lines.extend(figures.points.iter().map(|point| line("accuracy", point)));
         lines.extend(figures.renderers.iter().map(|point| line("accuracy renderer", point)));
+        lines.extend(figures.effects.iter().map(|point| line("accuracy effects", point)));
         let chart = accuracy_chart(&figures.points);
         let stem = scene.name.replace(|c: char| !(c.is_alphanumeric() || "._-".contains(c)), "_");
         let path = |kind: &str| out.join(format!("{stem}.{kind}"));
@@ -148,7 +161,7 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
 fn tell(
     args: &AccuracyArgs,
     scene: &Scene,
-    Figures { points, renderers }: &Figures,
+    Figures { points, renderers, effects }: &Figures,
     words: &mut String,
     streams: &mut Streams<'_>,
 ) -> Result<bool, CliError> {
@@ -170,10 +183,14 @@ fn tell(
         for point in renderers {
             writeln!(streams.out, "{}", line("accuracy renderer", point))?;
         }
+        for point in effects {
+            writeln!(streams.out, "{}", line("accuracy effects", point))?;
+        }
     } else {
         let width = streams.width;
         writeln!(streams.out, "{}\n{}", wrapped(&title, width), accuracy_table(points, width))?;
         writeln!(streams.out, "{}", renderer_table(renderers, width))?;
+        writeln!(streams.out, "{}", effect_table(effects, width))?;
         for finding in &findings[..2.min(findings.len())] {
             writeln!(streams.out, "{}\n", wrapped(finding, width))?;
         }

@@ -11,6 +11,48 @@ use crate::scene::{Placement, Scene};
 use motion::MotionEffect;
 use teleport::TeleportEffect;
 
+/// How often effects were evaluated: 0 for one that the scene does not declare.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Placements along paths.
+    pub motion: u64,
+    /// Offsets of jumpers.
+    pub teleport: u64,
+}
+
+/// A member of the family.
+#[derive(Clone, Copy, Debug)]
+pub struct EffectKind {
+    /// Its name in scene files and reports.
+    pub name: &'static str,
+    /// One line for people.
+    pub summary: &'static str,
+    /// Whether a scene declares it.
+    pub declared: fn(&Scene) -> bool,
+    /// Takes it out of a scene.
+    pub take_out: fn(&mut Scene),
+    /// How often it was evaluated.
+    pub work: fn(&Work) -> u64,
+}
+
+/// Every effect there is.
+pub const EFFECTS: &[EffectKind] = &[
+    EffectKind {
+        name: "motion",
+        summary: "objects on straight lines between walls, or round circuits",
+        declared: |scene| scene.effects.motion.is_some(),
+        take_out: |scene| scene.effects.motion = None,
+        work: |work| work.motion,
+    },
+    EffectKind {
+        name: "teleport",
+        summary: "objects that jump from place to place",
+        declared: |scene| scene.effects.teleport.is_some(),
+        take_out: |scene| scene.effects.teleport = None,
+        work: |work| work.teleport,
+    },
+];
+
 /// A scene with the effects that it declares.
 #[derive(Debug)]
 pub struct World {
@@ -35,16 +77,22 @@ impl World {
         Self { scene: Arc::clone(scene), motion, teleport, moving }
     }
 
-    /// Where an object stands at frame `t`.
+    /// Where an object stands at frame `t`; `work` is told of every effect that was evaluated for it.
     ///
     /// # Panics
     /// For an object that does not exist.
     #[must_use]
-    pub fn placement(&self, object: u32, t: u32) -> Placement {
+    pub fn placement(&self, object: u32, t: u32, work: &mut Work) -> Placement {
         let rest = self.scene.objects[object as usize].placement;
-        let placement =
-            self.motion.as_ref().map_or(rest, |motion| motion.placement(object, rest, t));
+        if self.moving.binary_search(&object).is_err() {
+            return rest;
+        }
+        let placement = self.motion.as_ref().map_or(rest, |motion| {
+            work.motion += 1;
+            motion.placement(object, rest, t)
+        });
         let Some(teleport) = &self.teleport else { return placement };
+        work.teleport += 1;
         let translation = placement.translation + teleport.offset(object, t);
         Placement { translation, ..placement }
     }

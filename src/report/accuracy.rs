@@ -2,7 +2,8 @@
 
 use super::columns::{Column, Columns};
 use super::scatter::{Dot, Scatter};
-use crate::accuracy::{Point, RendererPoint, front};
+use crate::accuracy::{EffectPoint, Point, RendererPoint, front};
+use crate::effect::EFFECTS;
 
 /// Settings that take nothing from the truth, in the chart's legend.
 const SOUND: &str = "takes nothing";
@@ -78,6 +79,38 @@ pub fn renderer_table(points: &[RendererPoint], width: Option<usize>) -> String 
         ],
     ];
     Columns { head: ("renderer".to_owned(), 20), names, groups }.text(width)
+}
+
+/// What effects cost, a row for each choice of them.
+#[must_use]
+pub fn effect_table(points: &[EffectPoint], width: Option<usize>) -> String {
+    let name = |point: &EffectPoint| match point.effects.as_slice() {
+        [] => "  none".to_owned(),
+        some => format!("  {}", some.join(", ")),
+    };
+    let evaluated = (0..EFFECTS.len())
+        .map(|i| of(points, EFFECTS[i].name, |p: &EffectPoint| p.evaluations[i].to_string()));
+    let frames = |point: &EffectPoint| f64::from(point.frames.max(1));
+    let groups = vec![
+        evaluated.collect(),
+        vec![
+            of(points, "boxes", |p| p.boxes.to_string()),
+            of(points, "moves", |p| p.moves.to_string()),
+            of(points, "state us", |p| {
+                format!("{:.2}", p.state_wall_ns[1] as f64 / frames(p) / 1e3)
+            }),
+        ],
+        vec![
+            of(points, "questions", |p| p.run.queries.to_string()),
+            of(points, "in vain", |p| p.run.excess_parts.to_string()),
+            of(points, "virtual ms", |p| {
+                format!("{:.3}", p.run.virtual_ns as f64 / frames(p) / 1e6)
+            }),
+            of(points, "wall ms (least-most)", |p| walls(p.run.wall_ns, p.frames)),
+        ],
+    ];
+    let names = points.iter().map(name).collect();
+    Columns { head: ("effects".to_owned(), 20), names, groups }.text(width)
 }
 
 /// Virtual time across, wrong pixels in a million upwards.

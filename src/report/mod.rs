@@ -14,7 +14,7 @@ mod row;
 mod scatter;
 
 pub use account::{account_picture, decision_line, item_name, step_line, truth_line};
-pub use accuracy::{accuracy_chart, accuracy_table, renderer_table};
+pub use accuracy::{accuracy_chart, accuracy_table, effect_table, renderer_table};
 pub use chart::{Chart, Series};
 pub use columns::wrapped;
 pub use comparison::{Comparison, Published, TABLE_1};

@@ -1,5 +1,6 @@
 //! A scene with its parts and effects, and its state at one frame: matrices, boxes, moves.
 
+use std::ops::Add;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -11,10 +12,10 @@ use super::Moment;
 use crate::cull::{ObjectView, View};
 use crate::effect;
 use crate::index::{Entry, Move};
-use crate::math::{ClipError, rounded_clip_matrix};
+use crate::math::{Aabb, ClipError, rounded_clip_matrix};
 use crate::oracle::{MemoryKnobs, OracleError, Stage, least_budget};
 use crate::part::{Cache, Made, ObjectId, PartedMesh, Partition, PartitionKnobs};
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Object, Scene};
 
 /// A scene ready to run: cut into parts, its declared effects built.
 pub struct World {
@@ -31,6 +32,23 @@ pub struct World {
     /// Wall time that cutting or reading the meshes took, seconds; a figure for reports.
     pub build_seconds: f64,
     effects: effect::World,
+    /// By object, where it stands if no effect moves it.
+    rest: Vec<Rest>,
+}
+
+/// An object where it stands: what does not change while it does not move.
+#[derive(Clone, Copy)]
+struct Rest {
+    world_from_object: DMat4,
+    object_from_world: DMat4,
+    bounds: Aabb,
+}
+
+impl Rest {
+    fn of(world_from_object: DMat4, partition: &Partition, object: ObjectId) -> Self {
+        let bounds = partition.mesh(object).bounds.transformed(&world_from_object);
+        Self { world_from_object, object_from_world: world_from_object.inverse(), bounds }
+    }
 }
 
 impl World {
@@ -56,7 +74,15 @@ impl World {
         let build_seconds = start.elapsed().as_secs_f64();
         let effects = effect::World::new(&scene);
         let (render, memory) = (Options::default(), None);
-        Self { scene, partition, render, memory, made, build_seconds, effects }
+        let rest = Self::at_rest(&scene, &partition);
+        Self { scene, partition, render, memory, made, build_seconds, effects, rest }
+    }
+
+    fn at_rest(scene: &Scene, partition: &Partition) -> Vec<Rest> {
+        let rest = |(id, object): (u32, &Object)| {
+            Rest::of(object.placement.world_from_object(), partition, ObjectId(id))
+        };
+        (0..).zip(&scene.objects).map(rest).collect()
     }
 
     /// The same, with the reference drawing in another way.
@@ -69,7 +95,8 @@ impl World {
     #[must_use]
     pub fn altered(self, alter: fn(&mut PartedMesh)) -> Self {
         let partition = Arc::new(self.partition.altered(alter));
-        Self { partition, ..self }
+        let rest = Self::at_rest(&self.scene, &partition);
+        Self { partition, rest, ..self }
     }
 
     /// The same, out of core: devices hold no more geometry than this.
@@ -102,7 +129,9 @@ impl World {
     /// For an object that does not exist.
     #[must_use]
     pub fn world_from_object(&self, object: ObjectId, t: u32) -> DMat4 {
-        self.effects.placement(object.0, self.scene.start + t).world_from_object()
+        let placement =
+            self.effects.placement(object.0, self.scene.start + t, &mut effect::Work::default());
+        placement.world_from_object()
     }
 
     /// A cleared image of the scene's size and depth order.
@@ -147,6 +176,31 @@ pub struct FrameState {
     pub matrices: Vec<[f32; 16]>,
     /// What changed since t − 1; empty at t = 0.
     pub moves: Vec<Move>,
+    /// What effects took to get here; nothing in a scene without any.
+    pub work: FrameWork,
+}
+
+/// What the declared effects of a scene take in a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameWork {
+    /// How often each was evaluated.
+    pub effects: effect::Work,
+    /// Matrices, inverses and boxes of objects made anew.
+    pub boxes: u64,
+    /// Moves that indexes were told of.
+    pub moves: u64,
+}
+
+impl Add for FrameWork {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        let effects = effect::Work {
+            motion: self.effects.motion + other.effects.motion,
+            teleport: self.effects.teleport + other.effects.teleport,
+        };
+        Self { effects, boxes: self.boxes + other.boxes, moves: self.moves + other.moves }
+    }
 }
 
 impl FrameState {
@@ -160,32 +214,43 @@ impl FrameState {
         let tick = world.scene.start + t;
         let camera = world.scene.cameras[moment.view as usize].at(tick);
         let clip_from_world = camera.clip_from_world(world.scene.viewport, world.scene.depth);
-        let objects: Vec<ObjectView> = (0..world.scene.objects.len() as u32)
-            .map(|object| {
-                let world_from_object = world.world_from_object(ObjectId(object), t);
-                let bounds = world.partition.mesh(ObjectId(object)).bounds;
-                let reach = if bounds.is_empty() { DVec3::ZERO } else { bounds.max_abs() };
-                ObjectView {
-                    bounds: bounds.transformed(&world_from_object),
-                    clip_from_object: clip_from_world * world_from_object,
-                    eye: world_from_object.inverse().transform_point3(camera.eye),
-                    error: ClipError::of(&clip_from_world, &world_from_object, reach),
+        let mut work = FrameWork::default();
+        let mut moving = world.effects.moving().iter().peekable();
+        let view = |(id, rest): (u32, &Rest)| {
+            // Nothing is evaluated for what no effect moves.
+            let placed = match moving.next_if_eq(&&id) {
+                None => *rest,
+                Some(_) => {
+                    work.boxes += 1;
+                    let placement = world.effects.placement(id, tick, &mut work.effects);
+                    Rest::of(placement.world_from_object(), &world.partition, ObjectId(id))
                 }
-            })
-            .collect();
+            };
+            let bounds = world.partition.mesh(ObjectId(id)).bounds;
+            let reach = if bounds.is_empty() { DVec3::ZERO } else { bounds.max_abs() };
+            ObjectView {
+                bounds: placed.bounds,
+                clip_from_object: clip_from_world * placed.world_from_object,
+                eye: placed.object_from_world.transform_point3(camera.eye),
+                error: ClipError::of(&clip_from_world, &placed.world_from_object, reach),
+            }
+        };
+        let objects: Vec<ObjectView> = (0..).zip(&world.rest).map(view).collect();
         let moved = |&object: &u32| {
             let bounds = objects[object as usize].bounds;
             let jumped = world.effects.jumped(object, tick);
             Move { object: ObjectId(object), bounds, jumped }
         };
         // Things at rest between two moves are not named: boxes tighten about them.
-        let differs = |&&object: &&u32| {
-            world.effects.placement(object, tick) != world.effects.placement(object, tick - 1)
+        let mut differs = |&&object: &&u32| {
+            let mut at = |tick: u32| world.effects.placement(object, tick, &mut work.effects);
+            at(tick) != at(tick - 1)
         };
         let moving = if t == 0 { &[] } else { world.effects.moving() };
-        let moves = moving.iter().filter(differs).map(moved).collect();
+        let moves: Vec<Move> = moving.iter().filter(&mut differs).map(moved).collect();
+        work.moves = moves.len() as u64;
         let matrices = objects.iter().map(|o| rounded_clip_matrix(&o.clip_from_object)).collect();
-        Self { moment, camera, clip_from_world, objects, matrices, moves }
+        Self { moment, camera, clip_from_world, objects, matrices, moves, work }
     }
 
     /// The first view of frame 0.

@@ -3,19 +3,19 @@
 //! It must not know the checks: an observer is anything that implements [`Observer`].
 
 mod account;
-mod approximation;
 mod calibrate;
 mod frame;
 mod lane;
+mod price;
 mod told;
 mod trace;
 mod truth;
 
 pub use account::{Account, Made, PartTruth, Step, account};
-pub use approximation::{Arithmetic, Rendering, render_approximately};
 pub use calibrate::{Bench, CalibrationKnobs, Workload, frames_to_measure, measure, workloads};
-pub use frame::{FrameState, World};
+pub use frame::{FrameState, FrameWork, World};
 pub use lane::{Lane, LaneInfo, Observer, Repeat, RunError, run};
+pub use price::{Arithmetic, Rendering, StatePrice, price_states, render_approximately};
 pub use told::told;
 pub use trace::{DeviceImages, FrameRecord, FrameTrace, Moment, Trace};
 pub use truth::{Truth, depth_complexity, fates_of_parts, partition_difference, render};

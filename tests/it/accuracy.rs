@@ -86,7 +86,7 @@ fn the_verb_leaves_charts_points_and_findings() {
     let lines = String::from_utf8(done.stdout).unwrap();
     let values: Vec<serde_json::Value> =
         lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    assert_eq!(values.len(), 5 + 6, "five values of the threshold, six renderers");
+    assert_eq!(values.len(), 5 + 6 + 2, "values of the threshold, renderers, choices of effects");
     assert!(values.iter().all(|value| value["version"] == 1));
     for file in ["rooms.svg", "rooms.png", "points.jsonl", "findings.md"] {
         assert!(folder.join(file).is_file(), "{file}");

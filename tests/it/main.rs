@@ -9,6 +9,7 @@ mod cli;
 mod common;
 mod compare;
 mod determinism;
+mod effects;
 mod faults;
 mod foreign;
 mod golden;

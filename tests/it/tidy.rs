@@ -110,7 +110,7 @@ fn nothing_compared_sees_a_clock_or_hash_order() {
             let timed = [
                 "run/lane.rs",
                 "run/frame.rs",
-                "run/approximation.rs",
+                "run/price.rs",
                 "run/calibrate.rs",
                 "cli/stress.rs",
             ];

@@ -1,11 +1,12 @@
-//! A frame by a renderer that is not exact, timed: one thread, every triangle, beside the exact one.
+//! Steps of a frame by themselves, timed: its picture by a renderer that is not exact (one thread, every
+//! triangle), and its state, which is what effects cost.
 
 use std::time::Instant;
 
 use plainsight_reference::Image;
 use plainsight_reference::approximate::{self, Interpolation};
 
-use super::{FrameState, World};
+use super::{FrameState, FrameWork, Moment, World};
 use crate::oracle::part_draw;
 use crate::part::PartId;
 
@@ -45,4 +46,32 @@ pub fn render_approximately(
         fragments += approximate::draw(image, &draw, arithmetic.interpolation, matrix);
     }
     Rendering { fragments, wall_ns: start.elapsed().as_nanos() as u64 }
+}
+
+/// What the state of all frames takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StatePrice {
+    /// What effects did, over all frames and views.
+    pub work: FrameWork,
+    /// Wall nanoseconds for all of them: the least, the median, the most of the rounds. Never compared.
+    pub wall_ns: [u64; 3],
+}
+
+/// The state of frames `0..frames`, `rounds` times, at least once.
+#[must_use]
+pub fn price_states(world: &World, frames: u32, rounds: u32) -> StatePrice {
+    let mut price = StatePrice::default();
+    let mut walls: Vec<u64> = (0..rounds.max(1))
+        .map(|_| {
+            price.work = FrameWork::default();
+            let start = Instant::now();
+            for moment in Moment::all(world, frames) {
+                price.work = price.work + FrameState::at(world, moment).work;
+            }
+            start.elapsed().as_nanos() as u64
+        })
+        .collect();
+    walls.sort_unstable();
+    price.wall_ns = [walls[0], walls[(walls.len() - 1) / 2], walls[walls.len() - 1]];
+    price
 }
