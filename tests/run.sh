@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs every test. Installs Mesa's lavapipe with the system's package manager where no Vulkan device
-# is found, fetches SwiftShader, a second and very different driver, and pins both, so that the hardware
-# tests mean the same everywhere. PLAINSIGHT_MODELS may name
+# is found, and a headless Chromium where there is none (it opens the report page), fetches SwiftShader, a
+# second and very different driver, and pins both, so that the hardware tests mean the same everywhere. PLAINSIGHT_MODELS may name
 # a folder of sample models (see tests/it/compare.rs). Arguments go to cargo test.
 set -eu
 cd "$(dirname "$0")/.."
@@ -27,6 +27,38 @@ install_lavapipe() {
     $root zypper --non-interactive install libvulkan_lvp libvulkan1
   else
     echo "tests/run.sh: install Mesa's lavapipe (package mesa-vulkan-drivers or alike) and run this again" >&2
+    exit 3
+  fi
+}
+
+browser() {
+  [ -n "${PLAINSIGHT_CHROMIUM:-}" ] && return
+  local name
+  for name in chromium-headless-shell chromium chromium-browser google-chrome google-chrome-stable headless_shell; do
+    command -v "$name" >/dev/null && return
+  done
+  return 1
+}
+
+install_browser() {
+  echo "tests/run.sh: no Chromium found; installing one" >&2
+  local root=""
+  if [ "$(id -u)" -ne 0 ]; then root="sudo"; fi
+  if command -v apt-get >/dev/null; then
+    $root apt-get update -qq
+    # The shell alone is half the size; not every release has it.
+    DEBIAN_FRONTEND=noninteractive $root apt-get install -y -qq --no-install-recommends chromium-headless-shell ||
+      DEBIAN_FRONTEND=noninteractive $root apt-get install -y -qq --no-install-recommends chromium
+  elif command -v dnf >/dev/null; then
+    $root dnf install -y chromium-headless
+  elif command -v pacman >/dev/null; then
+    $root pacman -S --noconfirm --needed chromium
+  elif command -v apk >/dev/null; then
+    $root apk add chromium
+  elif command -v zypper >/dev/null; then
+    $root zypper --non-interactive install chromium
+  else
+    echo "tests/run.sh: install Chromium, or name it with PLAINSIGHT_CHROMIUM, and run this again" >&2
     exit 3
   fi
 }
@@ -71,6 +103,7 @@ fetch_swiftshader() {
   mv "$partial" "$folder"
 }
 
+browser || install_browser
 # A device named by PLAINSIGHT_ADAPTER is not hidden by a pin.
 if [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}${PLAINSIGHT_ADAPTER:-}" ]; then
   [ -n "$(drivers)" ] || install_lavapipe

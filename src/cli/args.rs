@@ -9,6 +9,7 @@ use super::accuracy::AccuracyArgs;
 use super::export::ExportArgs;
 use super::faults::FaultsArgs;
 use super::judge::JudgeArgs;
+use super::report::ReportArgs;
 use super::stress::StressArgs;
 use super::why::WhyArgs;
 use crate::cull::ProxyKind;
@@ -56,6 +57,8 @@ pub(super) enum Verb {
     Stress(StressArgs),
     /// What accuracy costs in time: every knob in turn, what it loses beside what it takes.
     Accuracy(AccuracyArgs),
+    /// One HTML page of what runs came to, with charts, and pictures of every frame to scrub through.
+    Report(ReportArgs),
     /// List scenes, cullers, oracles, indexes and devices.
     List,
 }

@@ -13,6 +13,7 @@ mod list;
 mod picture;
 mod progress;
 mod replay;
+mod report;
 mod run;
 mod stress;
 mod why;
@@ -114,6 +115,7 @@ pub fn main(
         args::Verb::Faults(args) => faults::faults(&args, &mut streams),
         args::Verb::Stress(args) => stress::stress(&args, cullers, &mut streams),
         args::Verb::Accuracy(args) => accuracy::accuracy(&args, &mut streams),
+        args::Verb::Report(args) => report::report(&args, cullers, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),
     };
     done.unwrap_or_else(|error| {

@@ -1,5 +1,6 @@
 //! `run`: scenes × cullers × oracles, side by side under one truth.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -20,7 +21,7 @@ use crate::oracle::{
 use crate::part::{Cache, PartId};
 use crate::report::{Row, junit, table};
 use crate::run::{
-    FrameRecord, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World,
+    FrameRecord, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World,
     partition_difference, run as run_lanes,
 };
 use crate::scene::{Scene, generate};
@@ -247,6 +248,24 @@ impl Observer for DrawnAt {
     }
 }
 
+/// A lane's gate, and who else looks.
+struct Watched<'a, 'b> {
+    gate: &'a mut Gate,
+    lane: usize,
+    watch: &'a RefCell<&'b mut dyn FnMut(usize, &FrameRecord<'_>)>,
+}
+
+impl Observer for Watched<'_, '_> {
+    fn frame(&mut self, record: &FrameRecord<'_>) {
+        self.gate.frame(record);
+        (self.watch.borrow_mut())(self.lane, record);
+    }
+
+    fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
+        self.gate.repeated(first, again);
+    }
+}
+
 /// Everything that stays the same from scene to scene.
 pub(super) struct Plan<'a> {
     pub(super) cullers: Vec<CullerKind>,
@@ -290,6 +309,18 @@ impl Plan<'_> {
         streams: &mut Streams<'_>,
         built: &mut dyn FnMut(&World, &mut Streams<'_>) -> std::io::Result<()>,
     ) -> Result<Finished, CliError> {
+        self.run_watched(named, bar, streams, built, &mut |_, _| {})
+    }
+
+    /// The same; `watch` sees every frame of every lane, by the lane's number.
+    pub(super) fn run_watched(
+        &self,
+        named: &Named,
+        bar: &ProgressBar,
+        streams: &mut Streams<'_>,
+        built: &mut dyn FnMut(&World, &mut Streams<'_>) -> std::io::Result<()>,
+        watch: &mut dyn FnMut(usize, &FrameRecord<'_>),
+    ) -> Result<Finished, CliError> {
         let name = &named.name;
         let world = named.world(self.args, self.cache.as_ref(), bar, streams)?;
         bar.suspend(|| built(&world, streams))?;
@@ -304,17 +335,21 @@ impl Plan<'_> {
             .flat_map(|oracle| self.cullers.iter().map(move |&culler| (oracle.as_str(), culler)))
             .collect();
         gates.resize_with(lanes.len(), Gate::default);
+        let watch = RefCell::new(watch);
+        let watched = |(lane, gate)| Watched { gate, lane, watch: &watch };
+        let mut observers: Vec<Watched<'_, '_>> =
+            gates.iter_mut().enumerate().map(watched).collect();
         let shots = (u64::from(frames) + self.repeat.total(frames)) * u64::from(world.views());
         bar.inc_length(shots * lanes.len() as u64);
         let mut running: Vec<Lane<'_>> = Vec::new();
-        for (&(oracle, kind), gate) in lanes.iter().zip(&mut gates) {
+        for (&(oracle, kind), observer) in lanes.iter().zip(&mut observers) {
             let oracle = staged.make(oracle)?;
             let replay = self.replay_line(name, &world, kind.name, oracle.name());
             let info = LaneInfo::of(kind.name, oracle.as_ref(), replay);
             let culler = self.factory(kind, &world, &entries);
             let first = running.iter().all(|lane| lane.info.oracle != info.oracle);
             let with_bound = self.with_bound && first;
-            running.push(Lane { info, culler, oracle, observer: gate, with_bound });
+            running.push(Lane { info, culler, oracle, observer, with_bound });
         }
         bar.set_message(name.clone());
         let mut tick = || {
@@ -323,6 +358,7 @@ impl Plan<'_> {
         };
         let traces = run_lanes(&world, frames, self.repeat, &mut running, &mut tick)?;
         drop(running);
+        drop(observers);
         Ok(Finished { world, traces, gates })
     }
 

@@ -295,7 +295,7 @@ fn canary() -> Result<bool, CliError> {
 }
 
 /// Adds up the lines of files.
-fn merged(files: &[PathBuf]) -> Result<Tally, CliError> {
+pub(super) fn merged(files: &[PathBuf]) -> Result<Tally, CliError> {
     let mut tally = Tally::default();
     for path in files {
         let refuse = |place: &str, what: String| {

@@ -23,6 +23,7 @@ mod oracle;
 mod partition;
 mod proxies;
 mod readers;
+mod report;
 mod simulated;
 mod snapshots;
 mod stress;
