@@ -252,8 +252,11 @@ impl Observer for DrawnAt {
 struct Watched<'a, 'b> {
     gate: &'a mut Gate,
     lane: usize,
-    watch: &'a RefCell<&'b mut dyn FnMut(usize, &FrameRecord<'_>)>,
+    watch: &'a RefCell<&'b mut Watch<'b>>,
 }
+
+/// Sees a frame of a lane, by the lane's number.
+pub(super) type Watch<'a> = dyn FnMut(usize, &FrameRecord<'_>) + 'a;
 
 impl Observer for Watched<'_, '_> {
     fn frame(&mut self, record: &FrameRecord<'_>) {
