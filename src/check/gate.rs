@@ -96,7 +96,8 @@ impl Gate {
             }
         }
         if let Some(moment) = self.determinism.first_difference() {
-            lines.push(format!("determinism: {moment} left another trace when run again"));
+            let event = self.determinism.first_event();
+            lines.push(format!("determinism: {moment} left another trace when run again: {event}"));
         }
         if let Some(moment) = self.counts.overcounted() {
             lines.push(format!("counts: {moment} has more answers than questions"));

@@ -3,14 +3,17 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use rayon::prelude::*;
 use serde_json::json;
 
 use super::progress::progress_bar;
 use super::run::{catch_interrupt, interrupted};
 use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use crate::cull::CULLERS;
 use crate::fault::{self, Evidence, Fault, Harm, OTHERS, SOUND, Trial, faults as all_faults};
 use crate::run::World;
 use crate::scene::generate::HARD;
+use crate::stress::Choice;
 
 /// Version of the JSON line.
 const JSON_SCHEMA: u32 = 1;
@@ -35,6 +38,10 @@ pub(super) struct FaultsArgs {
     /// Most frames of each scene (default: all of a fault's, 1500 for unbroken cullers).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
+    /// Look for each fault in the worlds of `stress` instead, at most so many: how many seeds it takes.
+    #[arg(long, value_name = "SEEDS", num_args = 0..=1, default_missing_value = "2000",
+        value_parser = clap::value_parser!(u64).range(1..), conflicts_with_all = ["scene", "seed", "seeds", "frames"])]
+    swarm: Option<u64>,
     /// One JSON object a fault on standard output in place of the table.
     #[arg(long)]
     json: bool,
@@ -185,7 +192,139 @@ fn sound_runs(
     Ok(runs)
 }
 
+/// How often a fault is found in the swarm before its median is told.
+const FINDS: usize = 11;
+/// Worlds that run side by side before the next look at what was found.
+const CHUNK: u64 = 32;
+
+/// What looking for a fault in the swarm came to.
+struct Hunt {
+    fault: Fault,
+    /// Seeds in which it was caught.
+    found: Vec<u64>,
+    /// Seeds that were run, from 0 on.
+    run: u64,
+    /// What the gate said of the unbroken rig.
+    false_alarms: Vec<String>,
+}
+
+impl Hunt {
+    /// Looks at seeds from 0 on until the fault was caught often enough or `most` seeds are run.
+    fn new(fault: Fault, most: u64) -> Result<Self, CliError> {
+        let mut hunt = Self { fault, found: Vec::new(), run: 0, false_alarms: Vec::new() };
+        while hunt.run < most && hunt.found.len() < FINDS {
+            let seeds: Vec<u64> = (hunt.run..(hunt.run + CHUNK).min(most)).collect();
+            let evidence: Vec<Result<Evidence, CliError>> = seeds
+                .par_iter()
+                .map(|&seed| {
+                    let choice = Choice::of(seed, CULLERS, &[]);
+                    let trial = Trial::of(&fault, &choice.scene()?, choice.partition);
+                    Ok(trial.run(&fault, &mut || !interrupted())?)
+                })
+                .collect();
+            for (seed, evidence) in seeds.into_iter().zip(evidence) {
+                let evidence = evidence?;
+                if evidence.caught() {
+                    hunt.found.push(seed);
+                }
+                let alarms = evidence.false_alarms.into_iter();
+                hunt.false_alarms.extend(alarms.map(|line| format!("seed {seed}: {line}")));
+                hunt.run = seed + 1;
+            }
+        }
+        Ok(hunt)
+    }
+
+    /// The median number of seeds until it is caught, over the finds; `None` where it never was.
+    fn median(&self) -> Option<u64> {
+        let mut from = 0;
+        let mut waits: Vec<u64> = self
+            .found
+            .iter()
+            .map(|&seed| std::mem::replace(&mut from, seed + 1))
+            .zip(&self.found)
+            .map(|(from, &seed)| seed + 1 - from)
+            .collect();
+        waits.sort_unstable();
+        waits.get(waits.len().saturating_sub(1) / 2).copied()
+    }
+
+    fn json(&self) -> String {
+        json!({
+            "schema": JSON_SCHEMA,
+            "fault": self.fault.name,
+            "bug_class": self.fault.bug,
+            "summary": self.fault.summary,
+            "caught": !self.found.is_empty(),
+            "seeds_run": self.run,
+            "seeds_caught": self.found,
+            "median_seeds": self.median(),
+            "false_alarms": self.false_alarms,
+        })
+        .to_string()
+    }
+}
+
+/// Looks for each fault in at most `most` worlds of the swarm.
+fn hunt(args: &FaultsArgs, most: u64, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+    let mut out = args.out.as_deref().map(OutFile::create).transpose()?;
+    let chosen = pick(&args.fault)?;
+    catch_interrupt();
+    let bar = progress_bar();
+    bar.set_length(chosen.len() as u64);
+    let wide = chosen.iter().map(|fault| fault.name.len()).max().unwrap_or(0).max(5);
+    if !args.json {
+        writeln!(streams.out, "{:<wide$} class  median seeds  caught in", "fault")?;
+    }
+    let (mut caught, mut alarms, mut medians) = (0, 0, Vec::new());
+    for &fault in &chosen {
+        bar.set_message(fault.name);
+        let hunt = Hunt::new(fault, most);
+        if hunt.is_err() {
+            bar.finish_and_clear();
+        }
+        let hunt = hunt?;
+        bar.inc(1);
+        let line = hunt.json();
+        if let Some(out) = &mut out {
+            out.line(&line)?;
+        }
+        let median = hunt.median().map_or("NEVER".to_owned(), |median| median.to_string());
+        let (found, run) = (hunt.found.len(), hunt.run);
+        let text = match args.json {
+            true => line,
+            false => {
+                format!("{:<wide$} {:>5}  {median:>12}  {found} of {run}", fault.name, fault.bug)
+            }
+        };
+        bar.suspend(|| writeln!(streams.out, "{text}"))?;
+        for alarm in &hunt.false_alarms {
+            bar.suspend(|| writeln!(streams.talk, "FALSE ALARM: {} {alarm}", fault.sound.name))?;
+        }
+        alarms += hunt.false_alarms.len();
+        caught += usize::from(!hunt.found.is_empty());
+        medians.extend(hunt.median());
+    }
+    bar.finish_and_clear();
+    if let Some(out) = out {
+        out.finish(&[])?;
+    }
+    medians.sort_unstable();
+    let half = medians.get(medians.len().saturating_sub(1) / 2).copied().unwrap_or(0);
+    let to = if args.json { &mut streams.talk } else { &mut streams.out };
+    writeln!(
+        to,
+        "faults: the swarm caught {caught} of {}; half of them within a median of {half} seeds, all of those caught within {}; false alarms {alarms}",
+        chosen.len(),
+        medians.last().copied().unwrap_or(0)
+    )?;
+    Ok(if caught == chosen.len() && alarms == 0 { EXIT_HELD } else { EXIT_FAILED })
+}
+
 pub(super) fn faults(args: &FaultsArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+    if let Some(most) = args.swarm {
+        return hunt(args, most, streams);
+    }
     let out = args.out.as_deref().map(OutFile::create).transpose()?;
     let chosen = pick(&args.fault)?;
     catch_interrupt();

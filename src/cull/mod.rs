@@ -34,7 +34,7 @@ pub use draw_all::DrawAll;
 pub use full::{AfterGroup, Full, FullKnobs};
 pub use full_waits::{FullWaits, FullWaitsKnobs};
 pub use journal::{Journal, Question};
-pub use pen::{Counts, Finished, Pen};
+pub use pen::{Counts, Event, Finished, Pen};
 pub use per_view::PerView;
 pub use postponement::Postponement;
 pub use scenery::{Appearance, Item, NodeHistory, Scenery, SceneryKnobs, Weight};

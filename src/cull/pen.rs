@@ -1,6 +1,8 @@
 //! The pen: what a culler draws and asks with. It hands everything on to the oracle and keeps the
 //! record that the trace is made of.
 
+use std::fmt;
+
 use super::{Item, Journal, Question, Situation, Situations};
 use crate::oracle::{Amounts, Answer, Oracle, OracleError, Proxy, QueryId};
 use crate::part::{PartId, Partition};
@@ -39,6 +41,35 @@ impl Counts {
     }
 }
 
+/// Something that a culler did, or was told, in a frame: what its hash is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Event {
+    kind: u8,
+    value: u64,
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, value } = *self;
+        match kind {
+            DRAW => write!(f, "draw of part {value}"),
+            ASK => write!(f, "question {value}"),
+            ANSWER => {
+                let word = if value & 1 == 1 { "visible" } else { "hidden" };
+                write!(f, "answer \"{word}\" to question {}", value >> 1)
+            }
+            _ => write!(f, "a proxy's place or depth, {value:#x}"),
+        }
+    }
+}
+
+/// Kinds of events.
+const DRAW: u8 = 1;
+const ASK: u8 = 2;
+const RECTANGLE: u8 = 3;
+const ANSWER: u8 = 4;
+const HULL: u8 = 5;
+
 /// Draws, asks, and remembers.
 pub struct Pen<'a> {
     oracle: &'a mut dyn Oracle,
@@ -51,6 +82,7 @@ pub struct Pen<'a> {
     /// Questions of the batch that are about several proxies.
     several: Vec<QueryId>,
     journal: Option<&'a mut Journal>,
+    events: Option<Vec<Event>>,
 }
 
 /// A frame as it was drawn.
@@ -64,6 +96,8 @@ pub struct Finished {
     pub events_hash: u64,
     /// What the culler got into.
     pub situations: Situations,
+    /// The events themselves, where the pen was told to keep them.
+    pub events: Vec<Event>,
 }
 
 impl<'a> Pen<'a> {
@@ -79,7 +113,14 @@ impl<'a> Pen<'a> {
             situations: Situations::default(),
             several: Vec::new(),
             journal: None,
+            events: None,
         }
+    }
+
+    /// The same pen, that keeps every event as well.
+    #[must_use]
+    pub fn keeping_events(self) -> Self {
+        Self { events: Some(Vec::new()), ..self }
     }
 
     /// The same pen, that keeps a journal as well.
@@ -106,7 +147,7 @@ impl<'a> Pen<'a> {
     /// For an id beyond the last part.
     pub fn draw(&mut self, part: PartId) {
         if !std::mem::replace(&mut self.already[part.0 as usize], true) {
-            self.note(1, u64::from(part.0));
+            self.note(DRAW, u64::from(part.0));
             self.counts.triangles += u64::from(self.partition.part(part).triangle_count);
             self.drawn.push(part);
             self.oracle.draw_part(part);
@@ -140,20 +181,20 @@ impl<'a> Pen<'a> {
             let after_opened = journal.opened.len();
             journal.questions.push(Question { query, items, proxies, visible: None, after_opened });
         }
-        self.note(2, u64::from(query.0));
+        self.note(ASK, u64::from(query.0));
         for proxy in proxies {
             self.counts.pixels += proxy.pixels();
             if let Proxy::Rectangle { min, max, depth } | Proxy::Hull { min, max, depth, .. } =
                 proxy
             {
-                self.note(3, u64::from(min[0]) << 32 | u64::from(min[1]));
-                self.note(3, u64::from(max[0]) << 32 | u64::from(max[1]));
-                self.note(3, u64::from(depth.to_bits()));
+                self.note(RECTANGLE, u64::from(min[0]) << 32 | u64::from(min[1]));
+                self.note(RECTANGLE, u64::from(max[0]) << 32 | u64::from(max[1]));
+                self.note(RECTANGLE, u64::from(depth.to_bits()));
             }
             if let Proxy::Hull { hull, .. } = proxy {
                 for corner in hull.corners() {
                     let [x, y] = corner.map(|at| u64::from(at as u32));
-                    self.note(5, x << 32 | y);
+                    self.note(HULL, x << 32 | y);
                 }
             }
         }
@@ -178,7 +219,7 @@ impl<'a> Pen<'a> {
             if !answer.visible && self.several.binary_search(&answer.query).is_ok() {
                 self.situations.insert(Situation::SeveralHidden);
             }
-            self.note(4, u64::from(answer.query.0) << 1 | u64::from(answer.visible));
+            self.note(ANSWER, u64::from(answer.query.0) << 1 | u64::from(answer.visible));
             let question = self
                 .journal
                 .as_mut()
@@ -197,13 +238,17 @@ impl<'a> Pen<'a> {
     pub fn finish(self) -> Result<Finished, OracleError> {
         self.oracle.submit()?;
         self.oracle.collect(&mut Vec::new())?;
-        let Self { drawn, counts, events_hash, situations, .. } = self;
-        Ok(Finished { drawn, counts, events_hash, situations })
+        let Self { drawn, counts, events_hash, situations, events, .. } = self;
+        let events = events.unwrap_or_default();
+        Ok(Finished { drawn, counts, events_hash, situations, events })
     }
 
     /// FNV-1a over whole words.
-    fn note(&mut self, kind: u64, value: u64) {
-        for word in [kind, value] {
+    fn note(&mut self, kind: u8, value: u64) {
+        if let Some(events) = &mut self.events {
+            events.push(Event { kind, value });
+        }
+        for word in [u64::from(kind), value] {
             self.events_hash =
                 (self.events_hash ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
         }

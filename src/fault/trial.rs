@@ -9,8 +9,8 @@ use crate::index::Entry;
 use crate::oracle::CostModel;
 use crate::part::PartitionKnobs;
 use crate::run::{Lane, LaneInfo, Moment, Repeat, RunError, World, partition_difference, run};
-use crate::scene::SceneError;
 use crate::scene::generate::{Knobs, build};
+use crate::scene::{Scene, SceneError};
 
 /// What is run a second time, as for any culler.
 const REPEAT: Repeat = Repeat::first(1);
@@ -59,7 +59,7 @@ pub fn world(scene: &str, seed: u64, frames: Option<u32>) -> Result<World, Scene
     let scene = build(scene, &Knobs { seed: Some(seed), ..Knobs::default() })?;
     let frames = frames.map_or(scene.frames, |most| scene.frames.min(most));
     let leaf_triangles = scene.leaf_triangles;
-    let scene = crate::scene::Scene { frames, ..scene };
+    let scene = Scene { frames, ..scene };
     Ok(World::new(scene, PartitionKnobs { leaf_triangles, ..PartitionKnobs::default() }))
 }
 
@@ -77,6 +77,13 @@ impl Trial {
         let make = || world(scene, seed, frames);
         let altered = fault.broken.alter.map(|alter| make().map(|world| world.altered(alter)));
         Ok(Self { world: make()?, altered: altered.transpose()? })
+    }
+
+    /// Of a fault in a scene that is at hand, cut so.
+    #[must_use]
+    pub fn of(fault: &Fault, scene: &Scene, knobs: PartitionKnobs) -> Self {
+        let make = || World::new(scene.clone(), knobs);
+        Self { world: make(), altered: fault.broken.alter.map(|alter| make().altered(alter)) }
     }
 
     /// Frames and views of a run of both rigs, for a progress bar.

@@ -144,7 +144,8 @@ pub fn run(
         };
         let (mut everything, mut bound): (Option<ReadBack>, Option<u64>) = (None, None);
         for ((lane, culler), trace) in lanes.iter_mut().zip(&mut cullers).zip(&mut traces) {
-            let shot = shoot(world, &state, truth_facts(&truth), lane, culler.as_mut())?;
+            let again = repeat.rounds > 0 && moment.frame < repeat.frames;
+            let shot = shoot(world, &state, truth_facts(&truth), lane, culler.as_mut(), again)?;
             observe(world, &state, &truth, lane, &shot, &mut everything)?;
             let bounded = lane.info.device.is_some() && lane.with_bound && world.memory.is_none();
             if bounded && bound.is_none() {
@@ -204,14 +205,18 @@ fn shoot(
     (visible_parts, visible_triangles, truth_hash): (u32, u64, u64),
     lane: &mut Lane<'_>,
     culler: &mut dyn Culler,
+    keeps_events: bool,
 ) -> Result<Shot, OracleError> {
     let oracle = lane.oracle.as_mut();
     // Wall time is reported and never compared.
     let start = Instant::now();
     oracle.begin_frame(&frame_view(state))?;
     let mut pen = Pen::new(oracle, &world.partition);
+    if keeps_events {
+        pen = pen.keeping_events();
+    }
     culler.frame(&state.view(world), &mut pen)?;
-    let Finished { drawn, counts, events_hash, situations } = pen.finish()?;
+    let Finished { drawn, counts, events_hash, situations, events } = pen.finish()?;
     let wall_ns = start.elapsed().as_nanos() as u64;
     if cfg!(debug_assertions)
         && let Err(broken) = culler.check()
@@ -239,6 +244,7 @@ fn shoot(
         counts,
         memory,
         events_hash,
+        events,
         situations,
         clock,
         truth_hash,
@@ -293,7 +299,7 @@ fn run_again(
             for (place, (lane, culler)) in lanes.iter_mut().zip(&mut cullers).enumerate() {
                 let first = &traces[place].frames[shot];
                 let facts = (first.visible_parts, first.visible_triangles, first.truth_hash);
-                let again = shoot(world, &state, facts, lane, culler.as_mut())?;
+                let again = shoot(world, &state, facts, lane, culler.as_mut(), true)?;
                 walls[place][shot].push(again.trace.wall_ns);
                 lane.observer.repeated(first, &again.trace);
                 if !tick() {

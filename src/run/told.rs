@@ -47,6 +47,7 @@ pub fn told<E>(
             counts,
             memory: None,
             events_hash,
+            events: Vec::new(),
             situations: Situations::default(),
             clock: None,
             truth_hash,

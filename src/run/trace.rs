@@ -6,7 +6,7 @@ use std::fmt;
 use plainsight_reference::{Fates, Image};
 
 use super::{FrameState, HASH_START, LaneInfo, Truth, World, fates_of_parts, fold};
-use crate::cull::{Counts, Situations};
+use crate::cull::{Counts, Event, Situations};
 use crate::oracle::{Amounts, Clock, Memory, ReadBack};
 use crate::part::PartId;
 
@@ -98,6 +98,8 @@ pub struct FrameTrace {
     /// Hash of what the culler's own draws left: a reference renderer's image, a device's depth; 0 where no
     /// image is kept.
     pub image_hash: u64,
+    /// The events that were hashed, where the frame is run again: so that the first that differs can be named.
+    pub events: Vec<Event>,
     /// Wall time of the culler's frame, device included, in nanoseconds; the lower median where the
     /// frame was run several times. Never compared.
     pub wall_ns: u64,

@@ -1,7 +1,13 @@
 //! Same seed, same trace: twice, on one thread or several, in debug and release, on either oracle.
 
-use plainsight::cull::{CULLERS, ProxyKind};
+use std::cell::Cell;
+
+use plainsight::check::judge;
+use plainsight::cull::{CULLERS, Culler, Pen, ProxyKind, View};
 use plainsight::index::INDEXES;
+use plainsight::oracle::OracleError;
+use plainsight::part::PartId;
+use plainsight::scene::generate::{Knobs, build};
 use plainsight_reference::fast::{Options, SimdLevel};
 
 use crate::common::{SCENES, gate, world};
@@ -55,4 +61,42 @@ fn simd_levels_leave_the_same_hash() {
             }
         }
     }
+}
+
+/// Draws everything, the `moved` part last.
+struct Moody {
+    moved: Option<u32>,
+}
+
+impl Culler for Moody {
+    fn name(&self) -> &str {
+        "moody"
+    }
+
+    fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
+        let all = 0..view.partition.part_count();
+        let others = all.filter(|part| Some(*part) != self.moved);
+        others.chain(self.moved).for_each(|part| pen.draw(PartId(part)));
+        Ok(())
+    }
+}
+
+/// A culler that draws in another order the second time is told by the first event that differs.
+#[test]
+fn the_first_event_that_differs_is_named() {
+    let knobs = Knobs { scale: Some(0.02), frames: Some(2), ..Knobs::default() };
+    let scene = build("rooms", &knobs).unwrap();
+    // Asked for its name, for the run, and for the repetition.
+    let made = Cell::new(0);
+    let verdict = judge(scene, |_| {
+        made.set(made.get() + 1);
+        Box::new(Moody { moved: (made.get() > 2).then_some(5) })
+    })
+    .unwrap();
+    let failures = verdict.gate.failures();
+    let [line] = failures.as_slice() else { panic!("{failures:?}") };
+    assert!(
+        line.ends_with("when run again: event 5 was draw of part 5, and then draw of part 6"),
+        "{line}"
+    );
 }

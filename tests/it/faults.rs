@@ -36,3 +36,23 @@ fn every_fault_is_caught_and_nothing_else() {
     }
     assert_snapshot!(table);
 }
+
+/// The swarm finds faults by itself, and says how many seeds it takes.
+#[test]
+fn the_swarm_finds_faults_and_says_how_soon() {
+    let run = |args: &[&str]| {
+        let done = std::process::Command::new(env!("CARGO_BIN_EXE_plainsight"))
+            .args(["faults", "--swarm"])
+            .args(args)
+            .output()
+            .unwrap();
+        (done.status.code(), String::from_utf8(done.stdout).unwrap())
+    };
+    let (code, said) = run(&["32", "--fault", "two-corners,late-answer"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("the swarm caught 2 of 2"), "{said}");
+    // Too few seeds for a rare one: it is said, and fails.
+    let (code, said) = run(&["1", "--fault", "root-sticks-out"]);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("NEVER") && said.contains("caught 0 of 1"), "{said}");
+}
