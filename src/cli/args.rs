@@ -13,7 +13,7 @@ use super::report::ReportArgs;
 use super::stress::StressArgs;
 use super::why::WhyArgs;
 use crate::cull::ProxyKind;
-use crate::oracle::{Latency, MIB, MemoryKnobs, Schedule};
+use crate::oracle::{Latency, MIB, MemoryKnobs, Misbehaviour, Schedule};
 use crate::part::{Crossing, PartitionKnobs};
 use crate::run::CalibrationKnobs;
 use crate::scene::generate::{CameraMode, Knobs};
@@ -126,6 +126,10 @@ pub(super) struct SceneArgs {
     /// Share of hidden answers that the simulated device tells as visible, from 0 to 1.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
     pub(super) doubt: f64,
+    /// What the simulated device does wrong, once: lost=N or hangs=N (a submit, counted from 0 over the run),
+    /// unwritten=N (a question).
+    #[arg(long, value_name = "WHAT=N")]
+    pub(super) misbehave: Option<Misbehaviour>,
     /// Out of core: the MiB of geometry that each lane's device may hold (default: all of it).
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
     pub(super) memory: Option<u32>,
@@ -398,7 +402,8 @@ impl SceneArgs {
             LatencyArg::Jittery => Latency::Jittery,
             LatencyArg::Spiky => Latency::Spiky,
         };
-        Schedule { latency, doubt: self.doubt, ..Schedule::default() }
+        let misbehaviour = self.misbehave;
+        Schedule { latency, doubt: self.doubt, misbehaviour, ..Schedule::default() }
     }
 
     /// The memory of each lane's device.

@@ -261,7 +261,15 @@ impl Sweep<'_> {
             writeln!(to, "  picture: {}", picture.display())?;
         }
         let file = quoted(&file.display().to_string());
-        writeln!(to, "  replay: plainsight run --scene {file}{}", choice.flags())?;
+        match choice.policy {
+            None => writeln!(to, "  replay: plainsight run --scene {file}{}", choice.flags())?,
+            // The scene file stands alone, but no flag of `run` sets a policy of `full`.
+            Some(_) => writeln!(
+                to,
+                "  replay: {} (fails by the policy of full alone, for which run has no flags)",
+                self.replay(seed)
+            )?,
+        }
         Ok(())
     }
 }
@@ -428,8 +436,7 @@ fn conclude(args: &StressArgs, tally: &Tally, to: &mut dyn std::io::Write) -> Re
     // Of a single world what it did not reach says nothing.
     let said = |count: u64| count > 0 || tally.worlds > 1;
     for (probe, count) in tally.probes().into_iter().filter(|&(_, count)| said(count)) {
-        let rare = if count == 0 && probe.is_rare() { " (rare)" } else { "" };
-        writeln!(to, "  {count:>9}  {probe}{rare}")?;
+        writeln!(to, "  {count:>9}  {probe}")?;
     }
     let mut worst = |what: &str, outcome: &Option<Outcome>, figure: &dyn Fn(&Outcome) -> f64| {
         outcome.as_ref().map_or(Ok(()), |o| {

@@ -14,6 +14,7 @@ mod layers;
 mod opened;
 mod pen;
 mod per_view;
+mod pipelined;
 mod postponement;
 mod scenery;
 mod simple;
@@ -36,6 +37,7 @@ pub use full_waits::{FullWaits, FullWaitsKnobs};
 pub use journal::{Journal, Question};
 pub use pen::{Counts, Event, Finished, Pen};
 pub use per_view::PerView;
+pub use pipelined::Pipelined;
 pub use postponement::Postponement;
 pub use scenery::{Appearance, Item, NodeHistory, Scenery, SceneryKnobs, Weight};
 pub use simple::Simple;
@@ -181,6 +183,12 @@ pub const CULLERS: &[CullerKind] = &[
         summary: "CHC++, Mattausch et al. 2008: several nodes in a question, visible parts asked seldom",
         asks: true,
         make: |setup| Box::new(ChcPlus::new(setup)),
+    },
+    CullerKind {
+        name: "pipelined",
+        summary: "simple with several batches of questions on their way at once",
+        asks: true,
+        make: |setup| Box::new(Pipelined::new(setup)),
     },
     CullerKind {
         name: "draw-all",

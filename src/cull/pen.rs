@@ -206,9 +206,26 @@ impl<'a> Pen<'a> {
     /// # Errors
     /// What the oracle said.
     pub fn round_trip(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
+        self.send()?;
+        self.receive(answers)
+    }
+
+    /// Ends the batch and sends it on its way.
+    ///
+    /// # Errors
+    /// What the oracle said.
+    pub fn send(&mut self) -> Result<(), OracleError> {
+        self.oracle.submit()
+    }
+
+    /// Waits for the oldest batch that was sent and not received, and appends its answers in asking order;
+    /// nothing where there is none.
+    ///
+    /// # Errors
+    /// What the oracle said.
+    pub fn receive(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
         self.counts.round_trips += 1;
         let before = answers.len();
-        self.oracle.submit()?;
         self.oracle.collect(answers)?;
         for answer in &answers[before..] {
             self.counts.visible_answers += u64::from(answer.visible);

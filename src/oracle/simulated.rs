@@ -10,6 +10,8 @@
 //! 1 for any sample. Everything is a function of the schedule and of what is asked, so that it replays.
 
 use std::collections::VecDeque;
+use std::fmt;
+use std::str::FromStr;
 
 use plainsight_reference::Image;
 
@@ -56,6 +58,44 @@ pub enum Misbehaviour {
     Hangs(u32),
     /// The answer to the given question, counted from 0 over the run, is never written.
     Unwritten(u32),
+}
+
+impl Misbehaviour {
+    /// Whether it ends the run in an error.
+    #[must_use]
+    pub const fn is_fatal(self) -> bool {
+        matches!(self, Self::Lost(_) | Self::Hangs(_))
+    }
+}
+
+impl fmt::Display for Misbehaviour {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Lost(submit) => write!(f, "lost={submit}"),
+            Self::Hangs(submit) => write!(f, "hangs={submit}"),
+            Self::Unwritten(question) => write!(f, "unwritten={question}"),
+        }
+    }
+}
+
+impl FromStr for Misbehaviour {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!(
+                "'{text}' is none: write lost=N or hangs=N (a submit, counted from 0 over the run) or unwritten=N (a question)"
+            )
+        };
+        let (kind, number) = text.split_once('=').ok_or_else(wrong)?;
+        let number = number.parse().map_err(|_| wrong())?;
+        match kind {
+            "lost" => Ok(Self::Lost(number)),
+            "hangs" => Ok(Self::Hangs(number)),
+            "unwritten" => Ok(Self::Unwritten(number)),
+            _ => Err(wrong()),
+        }
+    }
 }
 
 /// What the device does, a function of its seed.

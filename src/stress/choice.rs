@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use crate::cull::{CullerKind, ProxyKind};
+use crate::cull::{AfterGroup, CullerKind, FullKnobs, Postponement, ProxyKind};
 use crate::index::{INDEXES, IndexKind};
-use crate::oracle::{CostModel, Latency, Questions, Schedule};
+use crate::oracle::{CostModel, Latency, Misbehaviour, Questions, Schedule};
 use crate::part::{Crossing, PartitionKnobs};
 use crate::scene::generate::{Knobs, SWARM, build};
 use crate::scene::{DepthOrder, Scene, SceneError, Stream, Viewport};
@@ -37,6 +37,8 @@ pub struct Choice {
     pub partition: PartitionKnobs,
     /// The culler.
     pub culler: CullerKind,
+    /// Of `full`, another policy than its own.
+    pub policy: Option<FullKnobs>,
     /// The index under it.
     pub index: IndexKind,
     /// What it asks about.
@@ -56,6 +58,25 @@ pub fn seed_of(text: &str) -> Result<u64, String> {
     let is_hash = text.len() == 40 && text.bytes().all(|b| b.is_ascii_hexdigit());
     let seed = if is_hash { u64::from_str_radix(&text[..16], 16) } else { text.parse() };
     seed.map_err(|_| format!("'{text}' is no seed: write a number or a commit's hash of 40 digits"))
+}
+
+/// Another policy of `full`; its own for one seed in three.
+fn policy(seed: u64) -> Option<FullKnobs> {
+    let mut policy = Stream::new(seed, "policy");
+    let knobs = FullKnobs {
+        most_in_flight: policy.pick(&[1024, 16, 1]),
+        postponement: policy.pick(&[
+            Postponement::Never,
+            Postponement::Figure3,
+            Postponement::Seldom,
+        ]),
+        most_together: policy.pick(&[1, 4, 16, 64]),
+        after_group: policy.pick(&[AfterGroup::AskAgain, AfterGroup::Trust]),
+        most_boxes: policy.pick(&[1, 4, 16]),
+        tighten: policy.below(2) == 0,
+        ..FullKnobs::default()
+    };
+    (policy.below(3) > 0).then_some(knobs)
 }
 
 impl Choice {
@@ -95,15 +116,21 @@ impl Choice {
         let kind = culler.pick(cullers);
         let proxy = culler.pick(&[ProxyKind::Rectangle, ProxyKind::Hull, ProxyKind::Box]);
         let index = Stream::new(seed, "index").pick(INDEXES);
+        let policy = (kind.name == FullKnobs::default().name).then(|| policy(seed)).flatten();
         let costs = CostModel::named();
         let cost = costs[culler.below(costs.len() as u32) as usize].clone();
         let mut device = Stream::new(seed, "device");
-        let schedule = Schedule {
-            seed,
-            latency: device.pick(&[Latency::Even, Latency::Jittery, Latency::Spiky]),
-            doubt: device.pick(&[0.0, 0.0, 0.05, 0.5, 1.0]),
-            misbehaviour: None,
+        let latency = device.pick(&[Latency::Even, Latency::Jittery, Latency::Spiky]);
+        let doubt = device.pick(&[0.0, 0.0, 0.05, 0.5, 1.0]);
+        let mut wrong = Stream::new(seed, "misbehaviour");
+        // One device in ten goes wrong, somewhere in the first frames.
+        let misbehaviour = match wrong.below(30) {
+            0 => Some(Misbehaviour::Lost(wrong.below(40))),
+            1 => Some(Misbehaviour::Hangs(wrong.below(40))),
+            2 => Some(Misbehaviour::Unwritten(wrong.below(200))),
+            _ => None,
         };
+        let schedule = Schedule { seed, latency, doubt, misbehaviour };
         let device = match device.below(8) {
             _ if !real.is_empty() => Device::Real(device.pick(real)),
             0 => Device::Sim,
@@ -111,7 +138,19 @@ impl Choice {
             _ => Device::Simulated(schedule),
         };
         let viewport = Viewport { width, height };
-        Self { seed, viewport, depth, frames, partition, culler: kind, index, proxy, cost, device }
+        Self {
+            seed,
+            viewport,
+            depth,
+            frames,
+            partition,
+            culler: kind,
+            policy,
+            index,
+            proxy,
+            cost,
+            device,
+        }
     }
 
     /// The scene.
@@ -131,17 +170,26 @@ impl Choice {
 }
 
 impl Choice {
+    /// What the device does wrong, if anything.
+    #[must_use]
+    pub fn misbehaviour(&self) -> Option<Misbehaviour> {
+        match self.device {
+            Device::Simulated(schedule) => schedule.misbehaviour,
+            _ => None,
+        }
+    }
+
     /// The same with one thing as plain as it can be; `None` after the last of these steps.
     #[must_use]
     pub fn simpler(&self, step: usize) -> Option<Self> {
-        let sound =
-            |schedule: Schedule| Schedule { latency: Latency::Even, doubt: 0.0, ..schedule };
+        let sound = |Schedule { seed, .. }: Schedule| Schedule { seed, ..Schedule::default() };
         let device = match self.device {
             Device::Simulated(schedule) => Device::Simulated(sound(schedule)),
             other => other,
         };
         let split = PartitionKnobs { crossing: Crossing::Split, ..self.partition };
-        let list: [&dyn Fn(Self) -> Self; 6] = [
+        let list: [&dyn Fn(Self) -> Self; 7] = [
+            &|choice| Self { policy: None, ..choice },
             &|choice| Self { device, ..choice },
             &|choice| Self { device: Device::Sim, ..choice },
             &|choice| Self { proxy: ProxyKind::Rectangle, ..choice },
@@ -159,9 +207,12 @@ impl Choice {
         match self.device {
             Device::Sim => flags += " --oracle sim",
             Device::HierarchicalZ => flags += " --oracle hierarchical-z",
-            Device::Simulated(Schedule { latency, doubt, .. }) => {
+            Device::Simulated(Schedule { latency, doubt, misbehaviour, .. }) => {
                 flags +=
                     &format!(" --oracle simulated --latency {} --doubt {doubt}", latency.name());
+                if let Some(misbehaviour) = misbehaviour {
+                    flags += &format!(" --misbehave {misbehaviour}");
+                }
             }
             Device::Real(questions) => flags += &format!(" --oracle {}", questions.name()),
         }
@@ -205,12 +256,28 @@ impl fmt::Display for Choice {
             self.index.name,
             self.cost.name
         )?;
+        if let Some(knobs) = &self.policy {
+            write!(
+                f,
+                "[{} in flight, {:?} postponement, {} together then {:?}, {} boxes, {}] ",
+                knobs.most_in_flight,
+                knobs.postponement,
+                knobs.most_together,
+                knobs.after_group,
+                knobs.most_boxes,
+                if knobs.tighten { "tightened" } else { "not tightened" }
+            )?;
+        }
         match self.device {
             Device::Sim => f.write_str("sim"),
             Device::HierarchicalZ => f.write_str("hierarchical-z"),
-            Device::Simulated(Schedule { latency, doubt, .. }) => {
+            Device::Simulated(Schedule { latency, doubt, misbehaviour, .. }) => {
                 let latency = latency.name();
-                write!(f, "simulated ({latency} latency, doubt {doubt})")
+                write!(f, "simulated ({latency} latency, doubt {doubt}")?;
+                match misbehaviour {
+                    Some(misbehaviour) => write!(f, ", {misbehaviour})"),
+                    None => f.write_str(")"),
+                }
             }
             Device::Real(questions) => f.write_str(questions.name()),
         }

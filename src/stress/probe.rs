@@ -30,12 +30,18 @@ pub enum Probe {
     FlatObject,
     /// A hidden answer came back as "visible".
     FalseVisible,
-    /// A batch was back before an earlier one. Rare: cullers that wait for each batch never see it.
+    /// A batch was back before an earlier one.
     Overtaken,
+    /// The device went away, and the run ended in an error.
+    Lost,
+    /// The device hung, and the run ended in an error.
+    Hung,
+    /// The answer to a question was never written, and was taken for "visible".
+    Unwritten,
 }
 
 /// Those that are of no culler.
-const OTHERS: [Probe; 10] = [
+const OTHERS: [Probe; 13] = [
     Probe::Appeared,
     Probe::Vanished,
     Probe::NothingShows,
@@ -46,6 +52,9 @@ const OTHERS: [Probe; 10] = [
     Probe::FlatObject,
     Probe::FalseVisible,
     Probe::Overtaken,
+    Probe::Lost,
+    Probe::Hung,
+    Probe::Unwritten,
 ];
 
 impl Probe {
@@ -64,12 +73,6 @@ impl Probe {
             }
         }
     }
-
-    /// Whether a sweep may never reach it: no fault of its size.
-    #[must_use]
-    pub fn is_rare(self) -> bool {
-        self == Self::Overtaken
-    }
 }
 
 impl fmt::Display for Probe {
@@ -86,6 +89,9 @@ impl fmt::Display for Probe {
             Self::FlatObject => "an object had no volume",
             Self::FalseVisible => "the device said visible of what is hidden",
             Self::Overtaken => "a batch overtook another",
+            Self::Lost => "the device went away",
+            Self::Hung => "the device hung",
+            Self::Unwritten => "an answer was never written",
         })
     }
 }

@@ -5,8 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::probe::{Probe, Watch};
 use super::{Choice, Device, Reached};
 use crate::check::Gate;
-use crate::cull::{CullerSetup, PerView};
-use crate::oracle::{HierarchicalZ, Oracle, OracleError, Questions, Sim, Simulated, Stage};
+use crate::cull::{CullerSetup, Full, PerView};
+use crate::oracle::{
+    HierarchicalZ, Misbehaviour, Oracle, OracleError, Questions, Sim, Simulated, Stage,
+};
 use crate::part::PartId;
 use crate::run::{
     FrameRecord, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World, run,
@@ -58,10 +60,13 @@ struct Watched {
     watch: Watch,
     /// What was drawn when something failed first.
     wrong: Option<(Moment, Vec<PartId>)>,
+    /// Frames and views seen.
+    shots: u32,
 }
 
 impl Observer for Watched {
     fn frame(&mut self, record: &FrameRecord<'_>) {
+        self.shots += 1;
         self.gate.frame(record);
         self.watch.frame(record);
         if self.wrong.is_none() && self.gate.first_failure().is_some() {
@@ -121,22 +126,59 @@ pub fn judged_in(choice: &Choice, scene: Scene, real: &MakeReal<'_>) -> Result<J
     };
     let entries = world.entries();
     let make = || {
-        (choice.culler.make)(CullerSetup {
+        let setup = CullerSetup {
             partition: world.partition.clone(),
             index: (choice.index.build)(&entries),
             proxy: choice.proxy,
             cost: choice.cost.clone(),
-        })
+        };
+        match &choice.policy {
+            Some(knobs) => Box::new(Full::new(setup, knobs.clone())),
+            None => (choice.culler.make)(setup),
+        }
     };
     let mut watched = Watched::default();
     let info = LaneInfo::of(choice.culler.name, oracle.as_ref(), String::new());
     let culler = Box::new(|| PerView::over(world.views(), make));
     let lane = Lane { info, culler, oracle, observer: &mut watched, with_bound: false };
-    let repeated = choice.seed.is_multiple_of(REPEATED_ONE_IN);
+    // What goes wrong goes wrong once, and not again in a repetition.
+    let wrong = choice.misbehaviour();
+    let repeated = choice.seed.is_multiple_of(REPEATED_ONE_IN) && wrong.is_none();
     let repeat = if repeated { Repeat::first(frames) } else { Repeat::NONE };
-    let traces = run(&world, frames, repeat, &mut [lane], &mut || true)?;
-    let outcome = outcome(choice, said, &traces[0], &mut watched, repeated);
+    let ran = run(&world, frames, repeat, &mut [lane], &mut || true);
+    let outcome = match (ran, wrong) {
+        (Ok(traces), _) => outcome(choice, said, &traces[0], &mut watched, repeated),
+        // It must end so, and all frames before must be right.
+        (Err(RunError::Oracle(OracleError::Lost(_))), Some(wrong)) if wrong.is_fatal() => {
+            ended(choice, said, wrong, &mut watched)
+        }
+        (Err(error), _) => return Err(error),
+    };
     Ok(Judged { outcome, wrong: watched.wrong, world })
+}
+
+/// What became of a world whose device went away as it was told to.
+fn ended(choice: &Choice, scene: String, wrong: Misbehaviour, watched: &mut Watched) -> Outcome {
+    let Watched { gate, watch, shots, .. } = watched;
+    let reached: &mut Reached = &mut watch.reached;
+    reached.note(Probe::Lost, matches!(wrong, Misbehaviour::Lost(_)));
+    reached.note(Probe::Hung, matches!(wrong, Misbehaviour::Hangs(_)));
+    Outcome {
+        seed: choice.seed,
+        options: choice.to_string(),
+        scene,
+        shots: *shots,
+        failures: gate.failures(),
+        failed_in: gate.first_failure().map(|moment| moment.frame),
+        reached: reached.probes().iter().map(Probe::to_string).collect(),
+        drawn: gate.excess.drawn(),
+        visible: gate.excess.visible(),
+        queries: gate.counts.total().queries,
+        virtual_ns: 0,
+        repeated: false,
+        hash: String::new(),
+        replay: String::new(),
+    }
 }
 
 impl Outcome {
@@ -175,6 +217,7 @@ fn outcome(
     if let Some(clock) = clock {
         reached.note(Probe::FalseVisible, clock.false_visible > 0);
         reached.note(Probe::Overtaken, clock.overtakes > 0);
+        reached.note(Probe::Unwritten, clock.unwritten > 0);
     }
     let modelled = || trace.sum(|frame| choice.cost.frame_total_ns(frame.amounts()));
     Outcome {
