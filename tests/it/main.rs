@@ -5,6 +5,7 @@ mod accuracy;
 mod broken;
 mod cache;
 mod calibrate;
+mod checks;
 mod cli;
 mod common;
 mod compare;
