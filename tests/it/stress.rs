@@ -4,17 +4,18 @@
 use std::path::Path;
 
 use plainsight::cli::{EXIT_FAILED, EXIT_HELD, Streams, main};
-use plainsight::cull::{CULLERS, Culler, CullerKind, CullerSetup, DrawAll, Pen, View};
+use plainsight::cull::{CULLERS, Culler, CullerKind, CullerSetup, DrawAll, Pen, ProxyKind, View};
 use plainsight::fault::{Harm, faults, first_failure};
+use plainsight::index::INDEXES;
 use plainsight::oracle::{Oracle, OracleError, Questions, Stage};
 use plainsight::part::{ObjectId, PartId, PartitionKnobs};
 use plainsight::run::World;
-use plainsight::scene::Scene;
 use plainsight::scene::generate::{Knobs, build};
+use plainsight::scene::{Scene, to_toml};
 use plainsight::stress::{Choice, Outcome, REPEATED_ONE_IN, Shrunk, Tally, judged, shrink, size};
 use rayon::prelude::*;
 
-use crate::common::{gpu, hardware_of};
+use crate::common::{gates, gpu, hardware_of};
 
 /// Seeds of the sweep that runs with every test. With fewer some situation is not reached.
 const SEEDS: u64 = 400;
@@ -219,5 +220,54 @@ fn shrink_at_full_size() {
             size(&shrunk.scene),
             shrunk.tried
         );
+    }
+}
+
+/// Where shrunk cases are kept: scene files that stand alone, named after the fault that failed in them.
+const CASES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cases");
+
+/// The scene of a kept case, and its world.
+fn case(path: &Path) -> World {
+    let scene = plainsight::scene::file::load(path, &Knobs::default())
+        .unwrap_or_else(|error| panic!("{error}"));
+    let knobs =
+        PartitionKnobs { leaf_triangles: scene.leaf_triangles, ..PartitionKnobs::default() };
+    World::new(scene, knobs)
+}
+
+/// What a sweep once shrunk fails for ever where it failed, and every unbroken culler holds there.
+#[test]
+fn kept_cases_still_tell_broken_from_sound() {
+    let mut paths: Vec<_> =
+        std::fs::read_dir(CASES).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    assert!(paths.len() >= 10, "{} cases", paths.len());
+    let all = faults();
+    paths.par_iter().for_each(|path| {
+        let (name, world) = (path.file_stem().unwrap().to_str().unwrap(), case(path));
+        let fault = all.iter().find(|fault| fault.name == name);
+        let fault = fault.unwrap_or_else(|| panic!("{name} is no fault"));
+        let failed = first_failure(&world, fault.broken, &mut || true).unwrap();
+        assert!(failed.is_some(), "{name} no longer fails in its case");
+        for index in INDEXES {
+            for (trace, gate) in gates(&world, CULLERS, *index, "sim", ProxyKind::Rectangle) {
+                assert!(gate.held(), "{name}: {}: {:?}", trace.lane.culler, gate.failures());
+            }
+        }
+    });
+}
+
+/// Makes the cases anew: `cargo test --release --test it make_cases -- --ignored`.
+#[test]
+#[ignore = "writes tests/cases"]
+fn make_cases() {
+    std::fs::create_dir_all(CASES).unwrap();
+    for (name, shrunk) in shrink_faults(&large(60, 12), usize::MAX) {
+        let (objects, _, triangles) = size(&shrunk.scene);
+        // Those that are about many objects are not small.
+        if objects <= 8 && triangles <= 200 {
+            let scene = Scene { name: name.clone(), ..shrunk.scene };
+            std::fs::write(Path::new(CASES).join(format!("{name}.toml")), to_toml(&scene)).unwrap();
+        }
     }
 }
