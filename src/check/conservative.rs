@@ -2,6 +2,9 @@
 //! device that is every part that shows a sample; on another, those of them that show on every device
 //! within its tolerance. Must implies visible, so the rest of the truth is asked only where a visible
 //! part is missing.
+//!
+//! A policy that trusts a stale "hidden" may declare for how many frames a part that shows may be missing.
+//! What is missing longer is a miss; what is not makes the verdict "held late", never "held".
 
 use plainsight_reference::{Fate, Tolerance};
 
@@ -26,9 +29,44 @@ pub struct Miss {
 pub struct Conservative {
     misses: Vec<Miss>,
     may_missed: u64,
+    /// For how many frames a part may be missing.
+    forgives: u32,
+    /// By view and part, for how many frames it has been missing; empty where nothing is forgiven.
+    missing: Vec<Vec<u32>>,
+    latest: u32,
 }
 
 impl Conservative {
+    /// One that lets a part that shows be missing for `frames` frames in a row.
+    #[must_use]
+    pub fn forgiving(frames: u32) -> Self {
+        Self { forgives: frames, ..Self::default() }
+    }
+
+    /// Whether a part that is missing (or not) in this frame has not been for too long.
+    fn forgives(&mut self, record: &FrameRecord<'_>, part: usize, is_missing: bool) -> bool {
+        if self.forgives == 0 {
+            return false;
+        }
+        let view = record.state.moment.view as usize;
+        if self.missing.len() <= view {
+            self.missing.resize(view + 1, vec![0; record.truth.visible_pixels.len()]);
+        }
+        let frames = &mut self.missing[view][part];
+        *frames = if is_missing { *frames + 1 } else { 0 };
+        let forgiven = *frames <= self.forgives;
+        if forgiven {
+            self.latest = self.latest.max(*frames);
+        }
+        forgiven
+    }
+
+    /// For how many frames a part that shows was missing at most, of what was forgiven.
+    #[must_use]
+    pub fn latest(&self) -> u32 {
+        self.latest
+    }
+
     /// Compares one frame.
     pub fn frame(&mut self, record: &FrameRecord<'_>) {
         let truth = record.truth;
@@ -37,10 +75,15 @@ impl Conservative {
             drawn[part.0 as usize] = true;
         }
         for (part, &pixels) in truth.visible_pixels.iter().enumerate() {
-            if pixels > 0 && !drawn[part] {
+            let is_missing = pixels > 0 && !drawn[part];
+            let forgiven = self.forgives(record, part, is_missing);
+            if is_missing {
                 let exact = record.lane.tolerance == Tolerance::EXACT;
                 if !exact && record.fates().parts[part] != Fate::Must {
                     self.may_missed += 1;
+                    continue;
+                }
+                if forgiven {
                     continue;
                 }
                 let part = PartId(part as u32);

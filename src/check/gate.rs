@@ -32,13 +32,17 @@ pub struct Gate {
     pub counts: CountsCheck,
     /// What was drawn in vain.
     pub excess: Excess,
+    /// Whether parts may be missing for some frames: then pictures may lack them, and are not compared.
+    late: bool,
 }
 
 impl Observer for Gate {
     fn frame(&mut self, record: &FrameRecord<'_>) {
         self.conservative.frame(record);
-        self.image.frame(record);
-        self.device_image.frame(record);
+        if !self.late {
+            self.image.frame(record);
+            self.device_image.frame(record);
+        }
         self.counts.frame(record);
         self.excess.frame(record);
     }
@@ -49,6 +53,25 @@ impl Observer for Gate {
 }
 
 impl Gate {
+    /// One that lets a part that shows be missing for `frames` frames in a row, and compares no pictures if
+    /// that is any.
+    #[must_use]
+    pub fn forgiving(frames: u32) -> Self {
+        let conservative = Conservative::forgiving(frames);
+        Self { conservative, late: frames > 0, ..Self::default() }
+    }
+
+    /// The verdict in a word: `held`, `failed`, or `held late(k)` where parts that show were missing, for k
+    /// frames at most, and that was allowed.
+    #[must_use]
+    pub fn word(&self) -> String {
+        match (self.held(), self.conservative.latest()) {
+            (false, _) => "failed".to_owned(),
+            (true, 0) => "held".to_owned(),
+            (true, latest) => format!("held late({latest})"),
+        }
+    }
+
     /// Whether everything held.
     #[must_use]
     pub fn held(&self) -> bool {
@@ -117,7 +140,7 @@ pub struct Verdict {
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let lane = &self.trace.lane;
-        let word = if self.gate.held() { "held" } else { "failed" };
+        let word = self.gate.word();
         let (drawn, visible) = (self.gate.excess.drawn(), self.gate.excess.visible());
         let queries = self.gate.counts.total().queries;
         write!(

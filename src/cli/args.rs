@@ -130,6 +130,10 @@ pub(super) struct SceneArgs {
     /// unwritten=N (a question).
     #[arg(long, value_name = "WHAT=N")]
     pub(super) misbehave: Option<Misbehaviour>,
+    /// Frames in a row for which a part that shows may be missing: for policies that trust a stale "hidden".
+    /// The verdict is then "held late(k)", and pictures are not compared.
+    #[arg(long, value_name = "FRAMES", default_value_t = 0)]
+    pub(super) late: u32,
     /// Out of core: the MiB of geometry that each lane's device may hold (default: all of it).
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..))]
     pub(super) memory: Option<u32>,
@@ -161,7 +165,8 @@ pub(super) struct RunArgs {
     /// Cullers (default: full simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
-    /// Oracles: sim, hierarchical-z, hardware, pyramid, read-back, always (default: sim, and hardware where a Vulkan device is found).
+    /// Oracles: sim, hierarchical-z, simulated, last-frame, hardware, pyramid, read-back,
+    /// always (default: sim, and hardware where a Vulkan device is found).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) oracle: Vec<String>,
     #[command(flatten)]
@@ -185,7 +190,8 @@ pub(super) struct CompareArgs {
     /// Cullers (default: full full-adaptive full-trusting simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
-    /// Oracles: sim, hierarchical-z, hardware, pyramid, read-back, always (default: sim, and hardware where a Vulkan device is found).
+    /// Oracles: sim, hierarchical-z, simulated, last-frame, hardware, pyramid, read-back,
+    /// always (default: sim, and hardware where a Vulkan device is found).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) oracle: Vec<String>,
     /// Leaf sizes to compare, most triangles in a part (default: --leaf; at full size those that the

@@ -108,7 +108,6 @@ impl Drop for Process {
 type Worst = Option<(Moment, Vec<PartId>)>;
 
 /// The gate, and what was drawn when it first failed.
-#[derive(Default)]
 struct Watch {
     gate: Gate,
     worst: Worst,
@@ -185,7 +184,7 @@ fn gate(
         replay: replay(args, world),
     };
     let parts = world.partition.part_count();
-    let mut watch = Watch::default();
+    let mut watch = Watch { gate: Gate::forgiving(args.scene_args.late), worst: None };
     let mut says = |state: &FrameState| -> Result<Vec<PartId>, CliError> {
         if interrupted() {
             return Err(RunError::Interrupted.into());

@@ -29,6 +29,10 @@ pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<
             "simulated",
             "the reference as a device with a clock: late answers, doubt (--latency, --doubt)",
         ),
+        (
+            "last-frame",
+            "the reference's depth of the frame before: what shows may be missing (see --late)",
+        ),
         ("hardware", "occlusion queries of a Vulkan device through wgpu"),
         (
             "pyramid",

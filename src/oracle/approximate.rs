@@ -63,6 +63,7 @@ impl Default for BufferKnobs {
 
 /// The oracle.
 pub struct Approximate {
+    name: &'static str,
     /// Draws at the buffer's size.
     sim: Sim,
     knobs: BufferKnobs,
@@ -86,7 +87,18 @@ impl Approximate {
         let [width, height] = [width, height].map(|side| side.div_ceil(knobs.divisor));
         let sim = Sim::new(Stage { viewport: Viewport { width, height }, ..stage });
         let (buffer, past) = (None, VecDeque::new());
-        Self { sim, knobs, width, buffer, past, started: false, answers: Batches::default() }
+        let (name, answers) = ("approximate", Batches::default());
+        Self { name, sim, knobs, width, buffer, past, started: false, answers }
+    }
+
+    /// Answers from the depth that the frame before left, at full size: what engines do that do not wait.
+    ///
+    /// # Panics
+    /// As [`Approximate::new`].
+    #[must_use]
+    pub fn last_frame(stage: Stage) -> Self {
+        let knobs = BufferKnobs { age: 1, ..BufferKnobs::default() };
+        Self { name: "last-frame", ..Self::new(stage, knobs) }
     }
 
     fn stored(&mut self) -> Vec<f32> {
@@ -115,7 +127,7 @@ impl Approximate {
 
 impl Oracle for Approximate {
     fn name(&self) -> &'static str {
-        "approximate"
+        self.name
     }
 
     fn memory(&self) -> Option<Memory> {

@@ -67,8 +67,8 @@ pub struct Row {
     pub memory: Option<MemoryFigures>,
     /// Hash of all that must repeat, 16 hexadecimal digits.
     pub trace_hash: String,
-    /// `held` or `failed`.
-    pub verdict: &'static str,
+    /// `held`, `held late(k)` or `failed`.
+    pub verdict: String,
 }
 
 impl Row {
@@ -107,7 +107,7 @@ impl Row {
             memory_budget_mib: world.memory.map(|m| m.budget_bytes as f64 / MIB as f64),
             memory: MemoryFigures::of(&trace.frames),
             trace_hash: format!("{:016x}", trace.hash()),
-            verdict: if gate.held() { "held" } else { "failed" },
+            verdict: gate.word(),
         }
     }
 

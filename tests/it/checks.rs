@@ -1,16 +1,20 @@
 //! Each check by itself: what it counts, where it points, and that it stays silent where all is right. The
 //! device is a fake one, so that what it gets wrong is known.
 
+use std::sync::OnceLock;
+
 use plainsight::check::{Gate, Verdict, judge};
 use plainsight::cull::{CULLERS, Culler, Pen, View};
 use plainsight::oracle::{
-    Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Sim, part_instance,
+    Answer, FrameView, Oracle, OracleError, Proxy, QueryId, ReadBack, Sim, part_instance,
 };
 use plainsight::part::{PartId, PartitionKnobs};
-use plainsight::run::{FrameState, Lane, LaneInfo, Moment, Repeat, Truth, World, run};
+use plainsight::run::{
+    FrameState, Lane, LaneInfo, Moment, Repeat, Truth, World, fates_of_parts, run,
+};
 use plainsight::scene::generate::{Knobs, build};
 use plainsight::scene::{Scene, Viewport};
-use plainsight_reference::fast;
+use plainsight_reference::{Fate, Tolerance, fast};
 
 const FRAMES: u32 = 3;
 const VIEWPORT: Viewport = Viewport { width: 70, height: 41 };
@@ -67,10 +71,18 @@ struct Fake {
     sim: Sim,
     world: World,
     matrices: Vec<[f32; 16]>,
+    flaws: Flaws,
+}
+
+/// What it gets wrong; nothing by default.
+#[derive(Clone, Copy, Default)]
+struct Flaws {
     /// Hands every answer over twice.
     twice: bool,
     /// A sample of its own image that has another depth.
     wrong: Option<usize>,
+    /// What it declares.
+    tolerance: Option<Tolerance>,
 }
 
 impl Oracle for Fake {
@@ -82,8 +94,8 @@ impl Oracle for Fake {
         Some("a fake".to_owned())
     }
 
-    fn memory(&self) -> Option<Memory> {
-        None
+    fn tolerance(&self) -> Tolerance {
+        self.flaws.tolerance.unwrap_or(Tolerance::EXACT)
     }
 
     fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {
@@ -106,7 +118,7 @@ impl Oracle for Fake {
     fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
         let before = answers.len();
         self.sim.collect(answers)?;
-        if self.twice {
+        if self.flaws.twice {
             answers.extend_from_within(before..);
         }
         Ok(())
@@ -114,7 +126,7 @@ impl Oracle for Fake {
 
     fn read_back(&mut self) -> Result<Option<ReadBack>, OracleError> {
         let mut own = self.sim.read_back()?;
-        if let (Some(own), Some(wrong)) = (&mut own, self.wrong) {
+        if let (Some(own), Some(wrong)) = (&mut own, self.flaws.wrong) {
             own.depth[wrong] = own.depth[wrong].next_down();
         }
         Ok(own)
@@ -132,11 +144,14 @@ impl Oracle for Fake {
     }
 }
 
-fn on_fake(twice: bool, wrong: Option<usize>, leaves_out: fn(&[PartId]) -> Vec<PartId>) -> Gate {
+fn on_fake(flaws: Flaws, leaves_out: fn(&[PartId]) -> Vec<PartId>) -> Gate {
+    before(Gate::default(), flaws, leaves_out)
+}
+
+fn before(mut gate: Gate, flaws: Flaws, leaves_out: fn(&[PartId]) -> Vec<PartId>) -> Gate {
     let world = world();
     let (sim, matrices) = (Sim::new(world.stage()), Vec::new());
-    let oracle = Box::new(Fake { sim, world: self::world(), matrices, twice, wrong });
-    let mut gate = Gate::default();
+    let oracle = Box::new(Fake { sim, world: self::world(), matrices, flaws });
     let info = LaneInfo::of("draws", oracle.as_ref(), String::new());
     let culler = Box::new(|| Box::new(Draws::but(leaves_out)) as Box<dyn Culler>);
     let lane = Lane { info, culler, oracle, observer: &mut gate, with_bound: false };
@@ -219,10 +234,10 @@ fn sums_are_those_of_the_frames() {
 /// One answer to one question is right, two are not.
 #[test]
 fn more_answers_than_questions_are_told() {
-    let right = on_fake(false, None, nothing);
+    let right = on_fake(Flaws::default(), nothing);
     assert_eq!(right.counts.overcounted(), None);
     assert!(right.held(), "{:?}", right.failures());
-    let wrong = on_fake(true, None, nothing);
+    let wrong = on_fake(Flaws { twice: true, ..Flaws::default() }, nothing);
     assert_eq!(wrong.counts.overcounted(), Some(Moment { frame: 0, view: 0 }));
     assert_eq!(wrong.failures(), ["counts: frame 0 has more answers than questions"]);
 }
@@ -230,18 +245,72 @@ fn more_answers_than_questions_are_told() {
 /// The device's own image: equal, off by one bit at one sample, or without a part.
 #[test]
 fn a_devices_image_is_compared_to_the_bit() {
-    let right = on_fake(false, None, nothing);
+    let right = on_fake(Flaws::default(), nothing);
     assert_eq!(right.device_image.equal(), Some(true));
     let place = 17 * VIEWPORT.width + 23;
-    let wrong = on_fake(false, Some(place as usize), nothing);
+    let wrong = on_fake(Flaws { wrong: Some(place as usize), ..Flaws::default() }, nothing);
     assert_eq!(wrong.device_image.equal(), Some(false));
     let differences = wrong.device_image.differences();
     assert_eq!(differences.len(), FRAMES as usize);
     assert_eq!((differences[1].pixels, differences[1].first_pixel), (1, [23, 17]));
     assert_eq!(differences[1].moment, Moment { frame: 1, view: 0 });
-    let lacks = on_fake(false, None, |visible| visible[..1].to_vec());
+    let lacks = on_fake(Flaws::default(), |visible| visible[..1].to_vec());
     assert_eq!(lacks.device_image.differences().len(), FRAMES as usize);
     let pixels: Vec<u32> = lacks.conservative.misses().iter().map(|miss| miss.pixels).collect();
     let differ = lacks.device_image.differences().iter().map(|d| d.pixels);
     assert_eq!(differ.collect::<Vec<_>>(), pixels, "where the part shows, nothing else does");
+}
+
+/// A part that shows and is missing for three frames is late by three: that is held where so many are
+/// allowed, and a miss in the third frame where only two are.
+#[test]
+fn lateness_is_forgiven_up_to_what_is_declared() {
+    fn throughout() -> PartId {
+        static PART: OnceLock<PartId> = OnceLock::new();
+        *PART.get_or_init(|| {
+            let world = world();
+            let every = |part: &&PartId| (0..FRAMES).all(|f| shows(&world, f).contains(*part));
+            *shows(&world, 0).iter().find(every).expect("some part shows in every frame")
+        })
+    }
+    let first = throughout();
+    let missing =
+        |allowed: u32| before(Gate::forgiving(allowed), Flaws::default(), |_| vec![throughout()]);
+    let strict = missing(0);
+    assert_eq!((strict.conservative.misses().len(), strict.word()), (3, "failed".to_owned()));
+    let two = missing(2);
+    let misses = two.conservative.misses();
+    assert_eq!((misses.len(), misses[0].moment.frame, misses[0].part), (1, 2, first));
+    assert_eq!(two.word(), "failed");
+    let three = missing(3);
+    assert_eq!((three.conservative.latest(), three.word()), (3, "held late(3)".to_owned()));
+    let all = before(Gate::forgiving(3), Flaws::default(), nothing);
+    assert_eq!(all.word(), "held", "nothing was late");
+}
+
+/// On a device with a tolerance what must show and is missing is a miss, and what only may show is counted.
+#[test]
+fn what_only_may_show_is_counted_and_no_miss() {
+    let tolerance = Tolerance { pixels: 0.2, ulps: 16, clipped_ulps: 16 };
+    let world = world();
+    let (mut must, mut may) = (Vec::new(), 0);
+    for frame in 0..FRAMES {
+        let state = FrameState::at(&world, Moment { frame, view: 0 });
+        let fates = fates_of_parts(&world, &state, tolerance);
+        for part in shows(&world, frame) {
+            match fates.parts[part.0 as usize] {
+                Fate::Must => must.push((frame, part)),
+                Fate::May | Fate::Hidden => may += 1,
+            }
+        }
+    }
+    assert!(!must.is_empty() && may > 1, "{} must, {may} may", must.len());
+    let flaws = Flaws { tolerance: Some(tolerance), ..Flaws::default() };
+    let gate = on_fake(flaws, |visible| visible.to_vec());
+    let misses = gate.conservative.misses().iter().map(|m| (m.moment.frame, m.part));
+    assert_eq!(misses.collect::<Vec<_>>(), must);
+    assert_eq!(gate.conservative.may_missed(), may);
+    // The picture is held to what is decided at each sample.
+    assert_eq!(gate.image.differences().len(), FRAMES as usize);
+    assert!(on_fake(flaws, nothing).image.differences().is_empty());
 }

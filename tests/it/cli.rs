@@ -309,3 +309,29 @@ fn compare_sets_the_paper_beside_its_own_and_draws_the_figures() {
     let (code, _, talk) = call(args("sim", &["--full-size"]));
     assert!(code == 2 && talk.contains("--full-size"), "--scale excludes it: {talk}");
 }
+
+/// What a stale "hidden" costs is a failure, unless it is declared; a device that goes wrong ends the run.
+#[test]
+fn lateness_is_declared_and_a_device_that_goes_away_is_exit_3() {
+    let scene = |more: &[&str]| {
+        let city = ["run", "--scene", "city", "--scale", "0.05", "--frames", "12"];
+        let full = ["--viewport", "160x120", "--culler", "full", "--oracle"];
+        plainsight(&[&city[..], &full, more].concat())
+    };
+    let (code, out, _) = scene(&["last-frame"]);
+    assert_eq!(code, 1, "{out}");
+    let (code, out, _) = scene(&["last-frame", "--late", "12", "--json"]);
+    assert_eq!(code, 0, "{out}");
+    assert!(out.contains("\"verdict\":\"held late("), "{out}");
+    let (code, out, _) = scene(&["sim", "--late", "12", "--json"]);
+    assert_eq!((code, out.contains("\"verdict\":\"held\"")), (0, true), "{out}");
+    for (what, said) in [("lost=1", "went away"), ("hangs=1", "no answer for 2 s")] {
+        let (code, _, err) = scene(&["simulated", "--misbehave", what]);
+        assert_eq!(code, 3, "{err}");
+        assert!(err.contains(said), "{err}");
+    }
+    assert_eq!(scene(&["simulated", "--misbehave", "unwritten=2"]).0, 0);
+    let (code, _, err) = scene(&["simulated", "--misbehave", "sulks"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("write lost=N"), "{err}");
+}
