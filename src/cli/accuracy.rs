@@ -24,6 +24,8 @@ use crate::scene::{Scene, Viewport};
 const VERSION: u32 = 1;
 /// What is looked at where nothing is said.
 const SCENES: [&str; 4] = ["bunnies", "city", "powerplant", "rooms"];
+/// Those that have a size of their own to be full.
+pub(super) const FULL_SIZE_SCENES: [&str; 2] = ["powerplant", "bunnies"];
 /// The quick size: a scale, frames and a viewport of every scene.
 const QUICK_SCALE: f64 = 0.1;
 const QUICK_FRAMES: u32 = 16;
@@ -60,6 +62,7 @@ impl AccuracyArgs {
     /// The scenes, in the quick size unless the user wants another.
     fn scenes(&self) -> Result<Vec<Scene>, CliError> {
         let names: Vec<&str> = match self.scene.is_empty() {
+            true if self.scene_args.full_size => FULL_SIZE_SCENES.to_vec(),
             true => SCENES.to_vec(),
             false => self.scene.iter().map(String::as_str).collect(),
         };

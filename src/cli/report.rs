@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::accuracy::FULL_SIZE_SCENES;
 use super::args::SceneArgs;
 use super::progress::progress_bar;
 use super::run::{
@@ -68,6 +69,7 @@ pub(super) fn report(
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
     let names: Vec<&str> = match args.scene.is_empty() {
+        true if args.scene_args.full_size => FULL_SIZE_SCENES.to_vec(),
         true => SCENES.to_vec(),
         false => args.scene.iter().map(String::as_str).collect(),
     };
