@@ -76,16 +76,12 @@ impl Conservative {
         }
         for (part, &pixels) in truth.visible_pixels.iter().enumerate() {
             let is_missing = pixels > 0 && !drawn[part];
-            let forgiven = self.forgives(record, part, is_missing);
-            if is_missing {
-                let exact = record.lane.tolerance == Tolerance::EXACT;
-                if !exact && record.fates().parts[part] != Fate::Must {
-                    self.may_missed += 1;
-                    continue;
-                }
-                if forgiven {
-                    continue;
-                }
+            let exact = record.lane.tolerance == Tolerance::EXACT;
+            // What need not show is not late either.
+            let need_not = is_missing && !exact && record.fates().parts[part] != Fate::Must;
+            self.may_missed += u64::from(need_not);
+            let is_missing = is_missing && !need_not;
+            if !self.forgives(record, part, is_missing) && is_missing {
                 let part = PartId(part as u32);
                 let shows = |sample: &usize| truth.part_at(record.world, *sample) == Some(part);
                 let sample = (0..truth.image.sample_count())
