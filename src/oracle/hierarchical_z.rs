@@ -10,6 +10,10 @@
 //! 3. Visible if any of them is at or beyond the rectangle's depth. At most two along an axis are those of
 //!    the rectangle's corners, so four looks are enough.
 //!
+//! The pyramid is built when it is asked, and anew after draws only where the one before does not hide the
+//! rectangle: depths come nearer alone as a frame goes on, and what lay behind lies behind still. The
+//! answers are those of a pyramid built for each.
+//!
 //! Its depth is the reference's, so what it may add to `sim` is only "visible". It loses where rectangles
 //! are large or straddle texels. A hull is asked about by the rectangle around it; a box counts as visible
 //! unasked.
@@ -73,9 +77,19 @@ pub struct HierarchicalZ<R = Sound> {
     /// Draws; is never asked.
     sim: Sim,
     pyramid: Pyramid<R>,
-    /// Whether anything was drawn since the pyramid was built.
-    stale: bool,
+    age: Age,
     answers: Batches,
+}
+
+/// What the pyramid shows.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Age {
+    /// All that is drawn.
+    Current,
+    /// What was drawn earlier in this frame.
+    OfThisFrame,
+    /// Another frame.
+    Older,
 }
 
 /// Farthest depths, level by level; level 0 is the image.
@@ -167,14 +181,27 @@ impl<R: PyramidRules> HierarchicalZ<R> {
     #[must_use]
     pub fn by_rules(stage: Stage) -> Self {
         let pyramid = Pyramid::new(1, vec![1.0]);
-        Self { sim: Sim::new(stage), pyramid, stale: true, answers: Batches::default() }
+        Self { sim: Sim::new(stage), pyramid, age: Age::Older, answers: Batches::default() }
     }
 
     fn build(&mut self) {
         let image = self.sim.image();
         let width = image.viewport().width as usize;
         self.pyramid = Pyramid::new(width, image.depths());
-        self.stale = false;
+        self.age = Age::Current;
+    }
+
+    /// Whether a rectangle may show, by all that is drawn.
+    fn may_show(&mut self, min: [u32; 2], max: [u32; 2], depth: f32) -> bool {
+        let held = self.age != Age::Older || R::ASKS_LAST_FRAME;
+        if held && !self.pyramid.may_show(min, max, depth) {
+            return false;
+        }
+        if self.age == Age::Current || R::ASKS_LAST_FRAME {
+            return true;
+        }
+        self.build();
+        self.pyramid.may_show(min, max, depth)
     }
 }
 
@@ -191,23 +218,22 @@ impl<R: PyramidRules> Oracle for HierarchicalZ<R> {
         if R::ASKS_LAST_FRAME {
             self.build();
         }
-        self.stale = true;
+        self.age = Age::Older;
         self.answers.clear();
         self.sim.begin_frame(view)
     }
 
     fn draw_part(&mut self, part: PartId) {
-        self.stale = true;
+        if self.age == Age::Current {
+            self.age = Age::OfThisFrame;
+        }
         self.sim.draw_part(part);
     }
 
     fn ask(&mut self, proxies: &[Proxy]) -> QueryId {
-        if self.stale && !proxies.is_empty() && !R::ASKS_LAST_FRAME {
-            self.build();
-        }
         let visible = proxies.iter().any(|proxy| match *proxy {
             Proxy::Rectangle { min, max, depth } | Proxy::Hull { min, max, depth, .. } => {
-                self.pyramid.may_show(min, max, depth)
+                self.may_show(min, max, depth)
             }
             Proxy::Box { .. } => true,
         });
