@@ -3,11 +3,10 @@
 use serde::Serialize;
 
 use super::knob::settings;
-use super::{Point, measure};
+use super::{Point, Worlds, measure};
 use crate::effect::{EFFECTS, EffectKind};
 use crate::oracle::CostModel;
-use crate::part::PartitionKnobs;
-use crate::run::{RunError, World, price_states};
+use crate::run::{RunError, price_states};
 use crate::scene::Scene;
 
 /// A scene with some of its effects.
@@ -40,11 +39,12 @@ pub struct EffectPoint {
 /// # Panics
 /// Never: the default setting is always there.
 pub fn effects(
-    scene: &Scene,
+    worlds: &Worlds<'_>,
     cost: &CostModel,
     rounds: u32,
     tick: &mut dyn FnMut() -> bool,
 ) -> Result<Vec<EffectPoint>, RunError> {
+    let scene = worlds.scene();
     let declared: Vec<&EffectKind> = EFFECTS.iter().filter(|kind| (kind.declared)(scene)).collect();
     let without = |kinds: &[&EffectKind]| {
         let mut scene = scene.clone();
@@ -58,10 +58,9 @@ pub fn effects(
     }
     let default = &settings(&[]).expect("no knob is named")[..1];
     let point = |scene: &Scene| {
-        let run = measure(scene, cost, rounds, default, tick)?;
-        let knobs =
-            PartitionKnobs { leaf_triangles: scene.leaf_triangles, ..PartitionKnobs::default() };
-        let price = price_states(&World::new(scene.clone(), knobs), scene.frames, rounds);
+        let worlds = worlds.told(scene.clone());
+        let run = measure(&worlds, cost, rounds, default, tick)?;
+        let price = price_states(&worlds.usual(), scene.frames, rounds);
         let there = EFFECTS.iter().filter(|kind| (kind.declared)(scene)).map(|kind| kind.name);
         Ok(EffectPoint {
             scene: scene.name.clone(),

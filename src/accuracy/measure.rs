@@ -3,14 +3,14 @@
 use plainsight_reference::Image;
 use serde::Serialize;
 
+use super::Worlds;
 use super::knob::{Setting, Tuning};
 use crate::check::Gate;
 use crate::cull::{CullerSetup, PerView};
 use crate::oracle::{Approximate, CostModel, Oracle, Schedule, Simulated};
 use crate::part::PartitionKnobs;
 use crate::run::{
-    FrameRecord, FrameTrace, Lane, LaneInfo, Observer, Repeat, RunError, Trace, World,
-    partition_difference, render, run,
+    FrameRecord, FrameTrace, Lane, LaneInfo, Observer, Repeat, RunError, Trace, World, render, run,
 };
 use crate::scene::Scene;
 
@@ -151,19 +151,20 @@ fn knobs(tuning: &Tuning, scene: &Scene) -> PartitionKnobs {
     PartitionKnobs { leaf_triangles: leaf, crossing: tuning.crossing }
 }
 
-/// Runs every setting over the frames of `scene`, `rounds` times, all on the simulated device of `cost`.
+/// Runs every setting over the frames of the scene, `rounds` times, all on the simulated device of `cost`.
 /// Settings that cut the meshes alike run side by side, on the same truth. `tick` is called after each
 /// frame of each setting and stops by returning false.
 ///
 /// # Errors
 /// [`RunError::Interrupted`] where `tick` says so.
 pub fn measure(
-    scene: &Scene,
+    worlds: &Worlds<'_>,
     cost: &CostModel,
     rounds: u32,
     settings: &[Setting],
     tick: &mut dyn FnMut() -> bool,
 ) -> Result<Vec<Point>, RunError> {
+    let scene = worlds.scene();
     let mut points: Vec<Option<Point>> = vec![None; settings.len()];
     while let Some(first) = points.iter().position(Option::is_none) {
         let knobs_of = |place: usize| knobs(&settings[place].tuning, scene);
@@ -171,8 +172,8 @@ pub fn measure(
         let here: Vec<usize> = (first..settings.len())
             .filter(|&place| points[place].is_none() && knobs_of(place) == partition)
             .collect();
-        let world = World::new(scene.clone(), partition);
-        let cut_pixels = partition_difference(&world);
+        let world = worlds.world(partition);
+        let cut_pixels = worlds.cut_pixels(&world);
         let entries = world.entries();
         let mut meters: Vec<Meter> = here
             .iter()

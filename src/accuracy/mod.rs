@@ -8,6 +8,7 @@
 //! | file | what |
 //! |---|---|
 //! | `knob` | the knobs, their values, the pairs |
+//! | `worlds` | the scene cut in several ways, each once |
 //! | `measure` | a setting run over a scene's frames |
 //! | `renderer` | renderers with less or more arithmetic than the reference |
 //! | `effects` | what each effect of a scene costs |
@@ -18,9 +19,11 @@ mod findings;
 mod knob;
 mod measure;
 mod renderer;
+mod worlds;
 
 pub use effects::{EffectPoint, effects};
 pub use findings::{findings, front};
 pub use knob::{KNOBS, Knob, PAIRS, Setting, Tuning, Value, settings};
 pub use measure::{Point, measure};
 pub use renderer::{RendererPoint, renderers};
+pub use worlds::{MakeWorld, Worlds};

@@ -4,10 +4,10 @@
 use plainsight_reference::approximate::Interpolation;
 use serde::Serialize;
 
+use super::Worlds;
 use super::measure::Difference;
-use crate::part::{PartId, PartitionKnobs};
-use crate::run::{Arithmetic, FrameState, Moment, Truth, World, render_approximately};
-use crate::scene::Scene;
+use crate::part::PartId;
+use crate::run::{Arithmetic, FrameState, Moment, Truth, render_approximately};
 
 /// What a renderer's pictures differ by, over all frames looked at.
 #[derive(Clone, Debug, Serialize, PartialEq)]
@@ -48,13 +48,15 @@ const RENDERERS: [(&str, Interpolation, &str, bool); 6] = [
     ("f32 plane", Interpolation::PlaneF32, "f64", true),
 ];
 
-/// Every renderer over a few frames of `scene`, spread over its run, `rounds` times each. `tick` is called
+/// Every renderer over a few frames of the scene, spread over its run, `rounds` times each. `tick` is called
 /// after each picture and stops, with what there is, by returning false.
 #[must_use]
-pub fn renderers(scene: &Scene, rounds: u32, tick: &mut dyn FnMut() -> bool) -> Vec<RendererPoint> {
-    let leaf_triangles = scene.leaf_triangles;
-    let world =
-        World::new(scene.clone(), PartitionKnobs { leaf_triangles, ..PartitionKnobs::default() });
+pub fn renderers(
+    worlds: &Worlds<'_>,
+    rounds: u32,
+    tick: &mut dyn FnMut() -> bool,
+) -> Vec<RendererPoint> {
+    let (scene, world) = (worlds.scene(), worlds.usual());
     let frames = scene.frames.min(MOST_FRAMES);
     let moment = |i: u32| Moment { frame: i * scene.frames / frames.max(1), view: 0 };
     let mut image = world.image();

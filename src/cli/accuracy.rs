@@ -1,5 +1,6 @@
 //! `accuracy`: what accuracy costs in time, knob by knob.
 
+use std::cell::RefCell;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -7,17 +8,18 @@ use serde_json::{Value, json};
 
 use super::args::SceneArgs;
 use super::compare::folder;
-use super::progress::progress_bar;
-use super::run::{Named, catch_interrupt, interrupted, matching, pick_cost};
+use super::progress::{counting_triangles, progress_bar};
+use super::run::{Named, catch_interrupt, interrupted, matching, pick_cache, pick_cost};
 use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
 use crate::accuracy::{
-    EffectPoint, KNOBS, Point, RendererPoint, effects, findings, measure, renderers, settings,
+    EffectPoint, KNOBS, Point, RendererPoint, Worlds, effects, findings, measure, renderers,
+    settings,
 };
 use crate::effect::EFFECTS;
 use crate::report::{
     accuracy_chart, accuracy_table, effect_table, picture_png, renderer_table, wrapped,
 };
-use crate::run::RunError;
+use crate::run::{RunError, World};
 use crate::scene::{Scene, Viewport};
 
 /// Of the JSON lines.
@@ -104,7 +106,7 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
         return Ok(EXIT_HELD);
     }
     let settings = settings(&args.knob).map_err(CliError::Usage)?;
-    let cost = pick_cost(&args.scene_args)?;
+    let (cost, cache) = (pick_cost(&args.scene_args)?, pick_cache(&args.scene_args)?);
     let scenes = args.scenes()?;
     let out = folder(&args.out)?;
     catch_interrupt();
@@ -127,12 +129,26 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
             bar.inc(1);
             !interrupted()
         };
-        let points = measure(scene, &cost, args.rounds, &settings, &mut tick)?;
-        let renderers = renderers(scene, args.rounds, &mut tick);
+        let warnings = RefCell::new(Vec::new());
+        let make = |scene: Scene, knobs| {
+            let name = scene.name.clone();
+            let world = counting_triangles(&bar, format!("{name}: object trees"), |progress| {
+                World::make(scene, knobs, cache.as_ref(), progress)
+            });
+            warnings.borrow_mut().extend(world.made.warnings.iter().cloned());
+            bar.set_message(name);
+            world
+        };
+        let worlds = Worlds::new(scene.clone(), &make);
+        let points = measure(&worlds, &cost, args.rounds, &settings, &mut tick)?;
+        let renderers = renderers(&worlds, args.rounds, &mut tick);
         if interrupted() {
             return Err(RunError::Interrupted.into());
         }
-        let effects = effects(scene, &cost, args.rounds, &mut tick)?;
+        let effects = effects(&worlds, &cost, args.rounds, &mut tick)?;
+        for line in warnings.take() {
+            bar.suspend(|| writeln!(streams.talk, "WARNING: {line}"))?;
+        }
         let figures = Figures { points, renderers, effects };
         failed |= bar.suspend(|| tell(args, scene, &figures, &mut words, streams))?;
         lines.extend(figures.points.iter().map(|point| line("accuracy", point)));

@@ -44,6 +44,14 @@ pub enum Crossing {
     Whole,
 }
 
+impl PartitionKnobs {
+    /// Every object is one part, whole.
+    #[must_use]
+    pub const fn uncut() -> Self {
+        Self { leaf_triangles: u32::MAX, crossing: Crossing::Split }
+    }
+}
+
 impl Default for PartitionKnobs {
     fn default() -> Self {
         Self { leaf_triangles: LEAF_TRIANGLES, crossing: Crossing::Split }

@@ -66,15 +66,31 @@ impl World {
         cache: Option<&Cache>,
         progress: &(dyn Fn(u64, u64) + Sync),
     ) -> Self {
-        let scene = Arc::new(scene);
         // Wall time is reported and never compared.
         let start = Instant::now();
         let (partition, made) = Partition::make(&scene, knobs, cache, progress);
-        let partition = Arc::new(partition);
         let build_seconds = start.elapsed().as_secs_f64();
+        Self { made, build_seconds, ..Self::over(scene, Arc::new(partition)) }
+    }
+
+    /// Over meshes that are cut already: those of a scene with the same meshes and objects, which may call
+    /// for other effects.
+    ///
+    /// # Panics
+    /// Where the scene has other objects.
+    #[must_use]
+    pub fn over(scene: Scene, partition: Arc<Partition>) -> Self {
+        let objects = (0..).map(ObjectId).zip(&scene.objects);
+        assert!(
+            scene.objects.len() == partition.object_count() as usize
+                && objects.into_iter().all(|(id, o)| o.mesh == partition.mesh_index(id)),
+            "the partition is that of other objects"
+        );
+        let scene = Arc::new(scene);
         let effects = effect::World::new(&scene);
         let (render, memory) = (Options::default(), None);
         let rest = Self::at_rest(&scene, &partition);
+        let (made, build_seconds) = (Made::default(), 0.0);
         Self { scene, partition, render, memory, made, build_seconds, effects, rest }
     }
 

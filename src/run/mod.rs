@@ -18,7 +18,9 @@ pub use lane::{Lane, LaneInfo, Observer, Repeat, RunError, run};
 pub use price::{Arithmetic, Rendering, StatePrice, price_states, render_approximately};
 pub use told::told;
 pub use trace::{DeviceImages, FrameRecord, FrameTrace, Moment, Trace};
-pub use truth::{Truth, depth_complexity, fates_of_parts, partition_difference, render};
+pub use truth::{
+    Truth, depth_complexity, difference_to, fates_of_parts, partition_difference, render,
+};
 
 /// FNV-1a over whole words with a rotation, the hash of everything a trace compares.
 #[must_use]

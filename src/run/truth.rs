@@ -108,12 +108,17 @@ pub fn depth_complexity(world: &World, state: &FrameState) -> f64 {
 /// one: what the T-junctions along the cuts cost.
 #[must_use]
 pub fn partition_difference(world: &World) -> u64 {
-    let knobs = PartitionKnobs { leaf_triangles: u32::MAX, ..PartitionKnobs::default() };
-    let uncut = World::new((*world.scene).clone(), knobs).rendered(world.render);
+    let uncut = World::new((*world.scene).clone(), PartitionKnobs::uncut());
+    difference_to(world, &uncut.rendered(world.render))
+}
+
+/// The same to a world of the same scene that is at hand.
+#[must_use]
+pub fn difference_to(world: &World, uncut: &World) -> u64 {
     let sources = |world: &World| {
         let truth = Truth::of(world, &FrameState::first(world));
         let source = |draw| world.partition.source_of_draw(draw);
         truth.image.draw_indices().map(|draw| draw.map(source)).collect::<Vec<_>>()
     };
-    sources(world).iter().zip(sources(&uncut)).filter(|(cut, whole)| **cut != *whole).count() as u64
+    sources(world).iter().zip(sources(uncut)).filter(|(cut, whole)| **cut != *whole).count() as u64
 }

@@ -3,9 +3,10 @@
 
 use std::process::Command;
 
-use plainsight::accuracy::{Point, findings, measure, renderers, settings};
+use plainsight::accuracy::{Point, Worlds, findings, measure, renderers, settings};
 use plainsight::oracle::CostModel;
 use plainsight::report::accuracy_table;
+use plainsight::run::World;
 use plainsight::scene::generate::{Knobs, build};
 use plainsight::scene::{Scene, Viewport};
 
@@ -19,7 +20,8 @@ fn rooms() -> Scene {
 fn points(knobs: &[&str], rounds: u32) -> Vec<Point> {
     let names: Vec<String> = knobs.iter().map(|name| (*name).to_owned()).collect();
     let settings = settings(&names).unwrap();
-    measure(&rooms(), &CostModel::lavapipe(), rounds, &settings, &mut || true).unwrap()
+    let worlds = Worlds::new(rooms(), &World::new);
+    measure(&worlds, &CostModel::lavapipe(), rounds, &settings, &mut || true).unwrap()
 }
 
 /// Every knob and every pair. The snapshot holds what is deterministic.
@@ -58,14 +60,18 @@ fn figures_repeat_and_rounds_leave_them() {
 /// The exact renderer in the written transform is the truth; the others are near it.
 #[test]
 fn renderers_stand_beside_the_truth() {
-    let all = renderers(&rooms(), 1, &mut || true);
+    let all = renderers(&Worlds::new(rooms(), &World::new), 1, &mut || true);
     assert_eq!(all.len(), 6);
     assert_eq!((all[0].wrong_pixels, all[0].other_depths, all[0].missed_parts), (0, 0, 0));
     let f32_plane = &all[2];
     assert!(f32_plane.other_depths > 0 && f32_plane.depth_error < 1e-4, "{f32_plane:?}");
     let double = &all[3];
     assert!(double.other_depths > 0 && double.wrong_pixels < double.samples / 100, "{double:?}");
-    assert_eq!(renderers(&rooms(), 1, &mut || false).len(), 0, "it stops where it is told");
+    assert_eq!(
+        renderers(&Worlds::new(rooms(), &World::new), 1, &mut || false).len(),
+        0,
+        "it stops where it is told"
+    );
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A scene pays for the effects that it declares, and for no others.
 
-use plainsight::accuracy::effects;
+use plainsight::accuracy::{Worlds, effects};
 use plainsight::effect::EFFECTS;
 use plainsight::oracle::CostModel;
 use plainsight::part::{ObjectId, PartitionKnobs};
@@ -62,7 +62,8 @@ fn objects_at_rest_are_where_they_would_be() {
 #[test]
 fn each_effect_has_its_price() {
     let scene = build("hard/teleports", &Knobs { frames: Some(6), ..Knobs::default() }).unwrap();
-    let points = effects(&scene, &CostModel::lavapipe(), 1, &mut || true).unwrap();
+    let points =
+        effects(&Worlds::new(scene, &World::new), &CostModel::lavapipe(), 1, &mut || true).unwrap();
     let said: Vec<&[&str]> = points.iter().map(|point| point.effects.as_slice()).collect();
     assert_eq!(said, [&["motion", "teleport"][..], &["teleport"], &["motion"], &[]]);
     for point in &points {
