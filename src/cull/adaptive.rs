@@ -27,6 +27,7 @@ use super::opened::{NO_PARENT, OpenedNodes};
 use super::scenery::{Appearance, NodeHistory};
 use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View};
 use crate::index::NodeId;
+use crate::math::Aabb;
 use crate::oracle::{CostModel, OracleError, Proxy};
 
 /// Share of the cost of frustum culling that questions may waste in a frame. On lavapipe they waste two
@@ -560,8 +561,8 @@ impl Culler for Adaptive {
         Ok(())
     }
 
-    fn check(&self) -> Result<(), String> {
-        self.scenery.check()
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        self.scenery.check(boxes)
     }
 
     fn scenery(&self, _: u32) -> Option<&Scenery> {

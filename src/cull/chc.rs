@@ -15,6 +15,7 @@ use super::opened::{NO_PARENT, OpenedNodes};
 use super::scenery::Appearance;
 use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View};
 use crate::index::NodeId;
+use crate::math::Aabb;
 use crate::oracle::OracleError;
 
 /// A node asked about.
@@ -116,8 +117,8 @@ impl Culler for Chc {
         Ok(())
     }
 
-    fn check(&self) -> Result<(), String> {
-        self.scenery.check()
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        self.scenery.check(boxes)
     }
 
     fn scenery(&self, _: u32) -> Option<&Scenery> {

@@ -15,6 +15,7 @@ use super::postponement::scatter;
 use super::scenery::{Appearance, NodeHistory};
 use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View, group};
 use crate::index::NodeId;
+use crate::math::Aabb;
 use crate::oracle::{OracleError, Proxy};
 
 /// Frames for which a visible part is assumed visible (the paper's n_av).
@@ -205,8 +206,8 @@ impl Culler for ChcPlus {
         Ok(())
     }
 
-    fn check(&self) -> Result<(), String> {
-        self.scenery.check()
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        self.scenery.check(boxes)
     }
 
     fn scenery(&self, _: u32) -> Option<&Scenery> {

@@ -36,6 +36,7 @@ use super::{
     Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, Situation, View, group,
 };
 use crate::index::NodeId;
+use crate::math::Aabb;
 use crate::oracle::{OracleError, Proxy};
 
 /// The rules of history that can be got wrong, as they are right. [`Sound`] keeps them all; others exist to
@@ -463,8 +464,8 @@ impl<R: HistoryRules> Culler for Full<R> {
         Ok(())
     }
 
-    fn check(&self) -> Result<(), String> {
-        self.scenery.check()
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        self.scenery.check(boxes)
     }
 
     fn scenery(&self, _: u32) -> Option<&Scenery> {

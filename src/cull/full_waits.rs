@@ -21,7 +21,7 @@
 use super::scenery::{Appearance, NodeHistory};
 use super::{Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, View};
 use crate::index::NodeId;
-use crate::math::PixelRectangle;
+use crate::math::{Aabb, PixelRectangle};
 use crate::oracle::{OracleError, QueryId};
 
 /// What can be tuned.
@@ -218,8 +218,8 @@ impl Culler for FullWaits {
         Ok(())
     }
 
-    fn check(&self) -> Result<(), String> {
-        self.scenery.check()
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        self.scenery.check(boxes)
     }
 
     fn scenery(&self, _: u32) -> Option<&Scenery> {

@@ -25,6 +25,7 @@ mod view_frustum;
 use std::sync::Arc;
 
 use crate::index::Index;
+use crate::math::Aabb;
 use crate::oracle::{CostModel, OracleError};
 use crate::part::Partition;
 
@@ -87,11 +88,13 @@ pub trait Culler {
     /// What the oracle said, passed on.
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError>;
 
-    /// Whether every structural promise of the culler and its index holds.
+    /// Whether every structural promise of the culler and its index holds, with the objects in these
+    /// world boxes.
     ///
     /// # Errors
     /// The first broken promise, in words.
-    fn check(&self) -> Result<(), String> {
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        let _ = boxes;
         Ok(())
     }
 

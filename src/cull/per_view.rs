@@ -3,6 +3,7 @@
 //! costs an index update a view.
 
 use super::{Culler, Item, Pen, Scenery, View};
+use crate::math::Aabb;
 use crate::oracle::OracleError;
 
 /// Hands each view to the culler of that number.
@@ -31,8 +32,8 @@ impl Culler for PerView {
         self.cullers[view.view as usize].frame(view, pen)
     }
 
-    fn check(&self) -> Result<(), String> {
-        self.cullers.iter().try_for_each(|culler| culler.check())
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        self.cullers.iter().try_for_each(|culler| culler.check(boxes))
     }
 
     fn scenery(&self, view: u32) -> Option<&Scenery> {

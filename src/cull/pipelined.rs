@@ -16,6 +16,7 @@ use std::collections::VecDeque;
 use super::scenery::Appearance;
 use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View};
 use crate::index::NodeId;
+use crate::math::Aabb;
 use crate::oracle::OracleError;
 
 /// Questions in a batch.
@@ -84,8 +85,8 @@ impl Culler for Pipelined {
         Ok(())
     }
 
-    fn check(&self) -> Result<(), String> {
-        self.scenery.check()
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        self.scenery.check(boxes)
     }
 
     fn scenery(&self, _: u32) -> Option<&Scenery> {

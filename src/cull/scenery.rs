@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::{CullerSetup, Pen, ProxyKind, Situation, View};
 use crate::index::{Index, NodeId};
-use crate::math::{self, Aabb, ClipBox, ClipError, Outline, PixelRectangle, Projection};
+use crate::math::{self, Aabb, ClipBox, ClipError, Outline, PixelRectangle, Projection, Volume};
 use crate::oracle::Proxy;
 use crate::part::{ObjectId, PartId, Partition};
 
@@ -163,6 +163,7 @@ impl Scenery {
     /// as there are slots; nodes that the index made anew inherit from what is below them.
     pub fn begin_frame<H: NodeHistory>(&mut self, view: &View<'_>, history: &mut Vec<H>) {
         self.index.update(view.moves);
+        self.index.refine(view.moves.boxes, &Volume::new(&view.clip_from_world, view.depth));
         history.resize(self.slot_count(), H::default());
         self.pass_on(history);
         let count = self.index.node_count() as usize;
@@ -537,7 +538,7 @@ impl Scenery {
     ///
     /// # Errors
     /// The first broken one.
-    pub fn check(&self) -> Result<(), String> {
-        self.index.check()
+    pub fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        self.index.check(boxes)
     }
 }

@@ -4,6 +4,7 @@
 use super::scenery::Appearance;
 use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View};
 use crate::index::NodeId;
+use crate::math::Aabb;
 use crate::oracle::OracleError;
 
 /// Occlusion culling without any thrift.
@@ -47,8 +48,8 @@ impl Culler for Simple {
         Ok(())
     }
 
-    fn check(&self) -> Result<(), String> {
-        self.scenery.check()
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        self.scenery.check(boxes)
     }
 
     fn scenery(&self, _: u32) -> Option<&Scenery> {

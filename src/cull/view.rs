@@ -2,7 +2,7 @@
 
 use glam::{DMat4, DVec3};
 
-use crate::index::Move;
+use crate::index::Moves;
 use crate::math::{Aabb, ClipBox, ClipError};
 use crate::part::Partition;
 use crate::scene::{Camera, DepthOrder, Viewport};
@@ -37,8 +37,8 @@ pub struct View<'a> {
     pub clip_from_world: DMat4,
     /// Every object, by id.
     pub objects: &'a [ObjectView],
-    /// Objects whose placement differs from the frame before, ascending; empty in frame 0.
-    pub moves: &'a [Move],
+    /// Where they are, and whose placement differs from the frame before; none in frame 0.
+    pub moves: Moves<'a>,
     /// The parts.
     pub partition: &'a Partition,
 }

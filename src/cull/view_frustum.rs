@@ -3,6 +3,7 @@
 
 use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View};
 use crate::index::NodeId;
+use crate::math::Aabb;
 use crate::oracle::OracleError;
 
 /// View-frustum culling.
@@ -36,8 +37,8 @@ impl Culler for ViewFrustum {
         Ok(())
     }
 
-    fn check(&self) -> Result<(), String> {
-        self.scenery.check()
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        self.scenery.check(boxes)
     }
 
     fn scenery(&self, _: u32) -> Option<&Scenery> {

@@ -109,10 +109,24 @@ impl World {
         self.teleport.as_ref().is_some_and(|teleport| teleport.jumped(object, t))
     }
 
-    /// The farthest an object's origin moves in one frame without a jump, world units; 0 for one that
-    /// stands still.
+    /// The farthest a point of the object moves in one frame without a jump, world units, for one that is
+    /// `offset` from its origin; 0 for an object that stands still.
     #[must_use]
-    pub fn step_bound(&self, object: u32) -> f64 {
-        self.motion.as_ref().map_or(0.0, |motion| motion.step_bound(object))
+    pub fn step_bound(&self, object: u32, offset: f64) -> f64 {
+        self.motion.as_ref().map_or(0.0, |motion| motion.step_bound(object, offset))
+    }
+
+    /// Whether the object ever turns.
+    #[must_use]
+    pub fn turns(&self, object: u32) -> bool {
+        self.motion.as_ref().is_some_and(|motion| motion.turns(object))
+    }
+
+    /// The largest coordinate, by its absolute value, that the object's origin ever has.
+    #[must_use]
+    pub fn extent(&self, object: u32) -> f64 {
+        let rest = self.scene.objects[object as usize].placement.translation.abs().max_element();
+        let moved = self.motion.as_ref().map_or(0.0, |motion| motion.extent(object));
+        rest.max(moved) + self.teleport.as_ref().map_or(0.0, |teleport| teleport.extent(object))
     }
 }

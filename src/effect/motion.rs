@@ -50,13 +50,36 @@ impl MotionEffect {
         }
     }
 
-    pub(super) fn step_bound(&self, object: u32) -> f64 {
+    /// Of a point that is `offset` from the origin.
+    pub(super) fn step_bound(&self, object: u32, offset: f64) -> f64 {
         self.path(object).map_or(0.0, |path| {
             STEP_SLACK
                 * match path {
-                    Path::Reflect { velocity, .. } => velocity.length(),
-                    Path::Circuit { speed, .. } => speed.abs(),
+                    // A chord is no longer than its arc, nor than the diameter.
+                    Path::Reflect { velocity, spin, .. } => {
+                        velocity.length() + offset * spin.abs().min(2.0)
+                    }
+                    // It may turn right about at a corner.
+                    Path::Circuit { speed, .. } => speed.abs() + 2.0 * offset,
                 }
+        })
+    }
+
+    pub(super) fn turns(&self, object: u32) -> bool {
+        self.path(object).is_some_and(|path| match path {
+            Path::Reflect { spin, .. } => *spin != 0.0,
+            Path::Circuit { .. } => true,
+        })
+    }
+
+    /// The largest coordinate of the path.
+    pub(super) fn extent(&self, object: u32) -> f64 {
+        let most = |points: &[DVec3]| {
+            points.iter().fold(0.0_f64, |most, point| most.max(point.abs().max_element()))
+        };
+        self.path(object).map_or(0.0, |path| match path {
+            Path::Reflect { min, max, .. } => most(&[*min, *max]),
+            Path::Circuit { corners, .. } => most(corners),
         })
     }
 }

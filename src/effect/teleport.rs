@@ -34,6 +34,13 @@ impl TeleportEffect {
         })
     }
 
+    /// The largest coordinate that is ever added.
+    pub(super) fn extent(&self, object: u32) -> f64 {
+        let place = self.jumping.binary_search(&object).ok();
+        let offsets = place.map_or(&[][..], |place| &self.jumps[place].offsets);
+        offsets.iter().fold(0.0, |most, offset| most.max(offset.abs().max_element()))
+    }
+
     /// Whether the object is elsewhere than in the frame before.
     pub(super) fn jumped(&self, object: u32, t: u32) -> bool {
         t > 0 && self.offset(object, t) != self.offset(object, t - 1)

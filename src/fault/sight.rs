@@ -5,7 +5,7 @@ use glam::{DMat4, DVec4};
 
 use super::{Fault, Rig, history};
 use crate::cull::{Culler, CullerSetup, Full, FullKnobs, ObjectView, Pen, View, ViewFrustum};
-use crate::math::ClipError;
+use crate::math::{Aabb, ClipError};
 use crate::oracle::OracleError;
 use crate::scene::Lens;
 
@@ -57,8 +57,8 @@ impl Culler for Misled {
         self.inner.frame(&View { clip_from_world: *clip_from_world, objects, ..*view }, pen)
     }
 
-    fn check(&self) -> Result<(), String> {
-        self.inner.check()
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        self.inner.check(boxes)
     }
 }
 

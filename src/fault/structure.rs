@@ -1,11 +1,13 @@
 //! Faults of the structures: the real scene tree whose upkeep goes wrong, and a mesh cut wrongly. The
 //! culler above is `full`.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 
 use super::{Fault, Rig, history};
-use crate::index::{Entry, Index, Move, Node, NodeId, TwoLevelBsp};
-use crate::math::Aabb;
+use crate::index::{Entry, Index, Moves, Node, NodeId, TwoLevelBsp, Work};
+use crate::math::{Aabb, Volume};
 use crate::part::{ObjectId, PartedMesh};
 
 /// What is broken.
@@ -75,7 +77,7 @@ impl Wrong {
         for &node in self.inner.rebuilt() {
             self.tight[node.0 as usize] = None;
         }
-        for &node in self.inner.top_down() {
+        for &node in self.inner.top_down().iter() {
             let number = node.0 as usize;
             let this = self.inner.node(node);
             this.objects.iter().for_each(|object| self.home[object.0 as usize] = node);
@@ -86,20 +88,20 @@ impl Wrong {
     }
 
     /// Loses what goes wrong with these moves before they are made.
-    fn lose(&mut self, moves: &[Move]) {
-        for this in moves {
-            let object = this.object.0 as usize;
+    fn lose(&mut self, moves: Moves<'_>) {
+        for &id in moves.moved {
+            let object = id.0 as usize;
             match self.flaw {
-                Flaw::Respawn if this.jumped => {
+                Flaw::Respawn if moves.jumped.contains(&id) => {
                     let neighbours = &self.objects[self.home[object].0 as usize];
-                    let last = neighbours.iter().rev().find(|&&other| other != this.object);
+                    let last = neighbours.iter().rev().find(|&&other| other != id);
                     if let Some(neighbour) = last {
                         self.lost[neighbour.0 as usize] = true;
                     }
                 }
                 _ => {}
             }
-            self.bounds[object] = this.bounds;
+            self.bounds[object] = *moves.bounds(id);
         }
     }
 }
@@ -109,31 +111,32 @@ impl Index for Wrong {
         self.inner.name()
     }
 
-    fn update(&mut self, moves: &[Move]) {
-        let stays = |this: &&Move| {
-            let home = self.inner.node(self.home[this.object.0 as usize]).query_box;
-            home.is_some_and(|space| space.contains_point(this.bounds.center()))
+    fn update(&mut self, moves: Moves<'_>) {
+        let stays = |id: &&ObjectId| {
+            let home = self.inner.node(self.home[id.0 as usize]).query_box;
+            home.is_some_and(|space| space.contains_point(moves.bounds(**id).center()))
         };
-        let taken: Vec<Move> = if self.flaw == Flaw::SameContainer {
-            moves.iter().filter(|this| !stays(this)).copied().collect()
+        let taken: Vec<ObjectId> = if self.flaw == Flaw::SameContainer {
+            moves.moved.iter().filter(|id| !stays(id)).copied().collect()
         } else {
-            moves.to_vec()
+            moves.moved.to_vec()
         };
-        self.lose(&taken);
+        let moves = Moves { moved: &taken, ..moves };
+        self.lose(moves);
         let before = self.home.clone();
-        self.inner.update(&taken);
+        self.inner.update(moves);
         self.relist();
         match self.flaw {
             Flaw::Neither => {
                 // What the tree makes anew it puts where it belongs.
                 let anew = !self.inner.rebuilt().is_empty();
-                let moved = taken.iter().map(|this| this.object.0 as usize);
+                let moved = taken.iter().map(|id| id.0 as usize);
                 for object in moved.filter(|&o| !anew && self.home[o] != before[o]) {
                     self.lost[object] = true;
                 }
             }
             Flaw::SamePlace => {
-                for object in taken.iter().map(|this| this.object.0 as usize) {
+                for object in taken.iter().map(|id| id.0 as usize) {
                     self.lost[object] = self.home[object] == before[object];
                 }
             }
@@ -147,11 +150,23 @@ impl Index for Wrong {
         self.relist();
     }
 
+    fn find(&mut self, boxes: &[Aabb], volume: &Volume, found: &mut Vec<ObjectId>) {
+        self.inner.find(boxes, volume, found);
+    }
+
+    fn work(&self) -> Work {
+        self.inner.work()
+    }
+
+    fn heap_bytes(&self) -> usize {
+        self.inner.heap_bytes()
+    }
+
     fn rebuilt(&self) -> &[NodeId] {
         self.inner.rebuilt()
     }
 
-    fn top_down(&self) -> &[NodeId] {
+    fn top_down(&self) -> Cow<'_, [NodeId]> {
         self.inner.top_down()
     }
 
@@ -179,7 +194,7 @@ impl Index for Wrong {
     }
 
     /// The gate is to find out.
-    fn check(&self) -> Result<(), String> {
+    fn check(&self, _: &[Aabb]) -> Result<(), String> {
         Ok(())
     }
 }

@@ -89,7 +89,7 @@ impl TwoPass {
         if aabb.is_empty() || (self.has(Flaw::FlatIsEmpty) && aabb.size().min_element() <= 0.0) {
             return Projection::Nowhere;
         }
-        let moves = || view.moves.iter().any(|m| m.object == object);
+        let moves = || view.moves.has(object);
         let clip = match self.flaw {
             Some(Flaw::Untransformed) if moves() => &view.clip_from_world,
             _ => &seen.clip_from_object,

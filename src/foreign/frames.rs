@@ -81,7 +81,8 @@ pub fn frame_line(world: &World, state: &FrameState) -> String {
     let moved: Vec<Moved> = if frame == 0 {
         (0..world.partition.object_count()).map(|object| moved(object, false)).collect()
     } else {
-        state.moves.iter().map(|this| moved(this.object.0, this.jumped)).collect()
+        let jumped = |id| state.jumped.binary_search(id).is_ok();
+        state.moved.iter().map(|id| moved(id.0, jumped(id))).collect()
     };
     let camera = state.camera;
     let (perspective, height) = match camera.lens {

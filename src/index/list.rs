@@ -1,21 +1,25 @@
 //! The stupid index: one node that holds every object. Never wrong, never of help.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 
-use super::{Entry, Index, Move, Node, NodeId};
+use super::{Entry, Index, Moves, Node, NodeId, Work};
+use crate::math::{Aabb, Volume};
 use crate::part::ObjectId;
 
-/// One node with all objects, in the order of their ids.
+/// One node with all objects, in the order of their ids. It finds by a look at every box.
 #[derive(Clone, Debug)]
 pub struct List {
     objects: Vec<ObjectId>,
+    work: Work,
 }
 
 impl List {
     /// Lists the objects.
     #[must_use]
     pub fn new(entries: &[Entry]) -> Self {
-        Self { objects: (0..entries.len() as u32).map(ObjectId).collect() }
+        Self { objects: (0..entries.len() as u32).map(ObjectId).collect(), work: Work::default() }
     }
 }
 
@@ -24,10 +28,25 @@ impl Index for List {
         "list"
     }
 
-    fn update(&mut self, _: &[Move]) {}
+    fn update(&mut self, _: Moves<'_>) {}
 
-    fn top_down(&self) -> &[NodeId] {
-        &[NodeId(0)]
+    /// Exactly what meets the volume.
+    fn find(&mut self, boxes: &[Aabb], volume: &Volume, found: &mut Vec<ObjectId>) {
+        self.work.object_checks += self.objects.len() as u64;
+        let meets = |id: &&ObjectId| volume.touches(&boxes[id.0 as usize]);
+        found.extend(self.objects.iter().filter(meets));
+    }
+
+    fn work(&self) -> Work {
+        self.work
+    }
+
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.objects.as_slice())
+    }
+
+    fn top_down(&self) -> Cow<'_, [NodeId]> {
+        Cow::Borrowed(&[NodeId(0)])
     }
 
     fn node_count(&self) -> u32 {
@@ -48,7 +67,7 @@ impl Index for List {
         None
     }
 
-    fn check(&self) -> Result<(), String> {
+    fn check(&self, _: &[Aabb]) -> Result<(), String> {
         Ok(())
     }
 }

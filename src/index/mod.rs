@@ -2,15 +2,27 @@
 //! stupid one. An index gets ids, world boxes, a bound on each object's step and a jump flag; it must
 //! not know scenes, cameras or oracles.
 
+mod bucket_octree;
+mod checklist;
 mod list;
+mod loose_octree;
+mod octree;
+mod tree;
 mod two_level_bsp;
+
+use std::borrow::Cow;
+use std::ops::Sub;
 
 use glam::DVec3;
 
-use crate::math::Aabb;
+use crate::math::{Aabb, Meets, Volume};
 use crate::part::ObjectId;
 
+pub use bucket_octree::{bounds_octree, extents_octree, radius_octree};
 pub use list::List;
+pub use loose_octree::{LooseKnobs, loose_octree};
+pub use octree::{octree, overlapping_octree};
+pub use tree::{Split, TreeKnobs};
 pub use two_level_bsp::TwoLevelBsp;
 
 /// A node of an index. Node 0 is the root.
@@ -22,19 +34,95 @@ pub struct NodeId(pub u32);
 pub struct Entry {
     /// World box; holds everything the object draws.
     pub bounds: Aabb,
-    /// The farthest the object's origin moves in one frame, world units; 0 for one that never moves.
+    /// The farthest the middle of its box moves in one frame without a jump, world units; 0 for one that
+    /// never moves.
     pub step_bound: f64,
+    /// The largest half side that its box ever has on any axis, however it turns.
+    pub reach: f64,
 }
 
-/// An object that changed since the last update.
+/// Where everything is, and what changed since the last update. An index that knows how far things can
+/// go in a frame need not read the list of what moved.
 #[derive(Clone, Copy, Debug)]
-pub struct Move {
-    /// Which.
-    pub object: ObjectId,
-    /// Its new world box.
-    pub bounds: Aabb,
-    /// Whether it may have gone farther than its step bound.
-    pub jumped: bool,
+pub struct Moves<'a> {
+    /// World boxes of all objects, by id.
+    pub boxes: &'a [Aabb],
+    /// Objects whose boxes are not those of the last update, ascending.
+    pub moved: &'a [ObjectId],
+    /// Those of them that may have gone farther than their step bound, ascending.
+    pub jumped: &'a [ObjectId],
+}
+
+impl Moves<'_> {
+    /// The box of an object.
+    ///
+    /// # Panics
+    /// For an object that does not exist.
+    #[must_use]
+    pub fn bounds(&self, object: ObjectId) -> &Aabb {
+        &self.boxes[object.0 as usize]
+    }
+
+    /// Whether the object moved.
+    #[must_use]
+    pub fn has(&self, object: ObjectId) -> bool {
+        self.moved.binary_search(&object).is_ok()
+    }
+}
+
+/// Operations of an index, in the words of Wortel 2011, section 4.1. The same for the same moves and
+/// volumes, everywhere.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Objects looked at in updates and found to be where they belong ("object ok").
+    pub ok: u64,
+    /// Objects that an update hung at another node ("tree updates").
+    pub updates: u64,
+    /// Nodes that updates looked at above and below, to find an object's place ("tree traversal steps").
+    pub steps: u64,
+    /// Nodes looked at when finding what is visible, those known to be visible with their parents too
+    /// ("node visibility checks").
+    pub node_checks: u64,
+    /// Objects looked at one by one when finding what is visible.
+    pub object_checks: u64,
+    /// Objects that were moved down when their node was looked at.
+    pub lowered: u64,
+}
+
+impl Sub for Work {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self {
+            ok: self.ok - other.ok,
+            updates: self.updates - other.updates,
+            steps: self.steps - other.steps,
+            node_checks: self.node_checks - other.node_checks,
+            object_checks: self.object_checks - other.object_checks,
+            lowered: self.lowered - other.lowered,
+        }
+    }
+}
+
+/// Finds by the boxes of nodes, top down: [`Index::find`] of those that put nothing off.
+fn find_by_nodes(index: &dyn Index, volume: &Volume, work: &mut Work, found: &mut Vec<ObjectId>) {
+    let mut stack = vec![(NodeId(0), false)];
+    let mut children = Vec::new();
+    while let Some((node, inside)) = stack.pop() {
+        work.node_checks += 1;
+        let this = index.node(node);
+        let meets = match (inside, this.tight_box.or(this.query_box)) {
+            (true, _) => Meets::Inside,
+            (false, Some(aabb)) => volume.meets(&aabb),
+            (false, None) => Meets::Partly,
+        };
+        if meets == Meets::Outside || this.subtree_objects == 0 {
+            continue;
+        }
+        found.extend_from_slice(this.objects);
+        index.children(node, DVec3::ZERO, &mut children);
+        stack.extend(children.drain(..).map(|child| (child, meets == Meets::Inside)));
+    }
 }
 
 /// What a node offers to a culler.
@@ -58,9 +146,25 @@ pub trait Index {
     fn name(&self) -> &'static str;
 
     /// Takes over the new boxes. Objects not named stay where they were.
-    fn update(&mut self, moves: &[Move]);
+    fn update(&mut self, moves: Moves<'_>);
 
-    /// The nodes that the latest update made anew: what was remembered of these numbers is void.
+    /// Does what the index puts off until a part of it is looked at, for everything that `volume` meets.
+    /// Comes after [`Index::update`], with the same boxes, and before a walk through the nodes.
+    fn refine(&mut self, boxes: &[Aabb], volume: &Volume) {
+        let _ = (boxes, volume);
+    }
+
+    /// Appends what may be inside `volume`, each object once: at least all whose boxes meet it. What is put
+    /// off is done on the way. Counts as visibility determination in [`Index::work`].
+    fn find(&mut self, boxes: &[Aabb], volume: &Volume, found: &mut Vec<ObjectId>);
+
+    /// Operations since it was built.
+    fn work(&self) -> Work;
+
+    /// Bytes on the heap.
+    fn heap_bytes(&self) -> usize;
+
+    /// The nodes that the latest update, or what was put off since, made anew: what was remembered of these numbers is void.
     fn rebuilt(&self) -> &[NodeId] {
         &[]
     }
@@ -71,7 +175,7 @@ pub trait Index {
     }
 
     /// Every node in use, parents before children.
-    fn top_down(&self) -> &[NodeId];
+    fn top_down(&self) -> Cow<'_, [NodeId]>;
 
     /// One more than the largest number of a node, at least one. Numbers may be out of use.
     fn node_count(&self) -> u32;
@@ -90,11 +194,11 @@ pub trait Index {
     /// A node's parent; `None` for the root.
     fn parent(&self, node: NodeId) -> Option<NodeId>;
 
-    /// Whether every structural promise holds.
+    /// Whether every structural promise holds, with the objects in these boxes.
     ///
     /// # Errors
     /// The first broken promise, in words.
-    fn check(&self) -> Result<(), String>;
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String>;
 }
 
 /// A member of the family.
@@ -108,6 +212,14 @@ pub struct IndexKind {
     pub build: fn(&[Entry]) -> Box<dyn Index>,
 }
 
+/// Levels that the members of the register leave to finding, where they do.
+const REDUCTION: u8 = 2;
+
+/// Knobs for any scene.
+fn usual(split: Split, entries: &[Entry]) -> TreeKnobs {
+    TreeKnobs::usual(split, entries.len())
+}
+
 /// Every index there is.
 pub const INDEXES: &[IndexKind] = &[
     IndexKind {
@@ -119,5 +231,81 @@ pub const INDEXES: &[IndexKind] = &[
         name: "list",
         summary: "one node that holds everything",
         build: |entries| Box::new(List::new(entries)),
+    },
+    IndexKind {
+        name: "octree",
+        summary: "Octree 1 of Wortel 2011: each object at the smallest node that holds it",
+        build: |entries| octree(entries, usual(Split::Octants, entries)),
+    },
+    IndexKind {
+        name: "quadtree",
+        summary: "the same over the ground",
+        build: |entries| octree(entries, usual(Split::Quadrants, entries)),
+    },
+    IndexKind {
+        name: "overlapping-octree",
+        summary: "Octree 2 of Wortel 2011: nodes larger than their space",
+        build: |entries| overlapping_octree(entries, usual(Split::Octants, entries)),
+    },
+    IndexKind {
+        name: "overlapping-quadtree",
+        summary: "the same over the ground",
+        build: |entries| overlapping_octree(entries, usual(Split::Quadrants, entries)),
+    },
+    IndexKind {
+        name: "bounds-octree",
+        summary: "Octree 3 of Wortel 2011: buckets, nodes as large as their contents",
+        build: |entries| bounds_octree(entries, usual(Split::Octants, entries)),
+    },
+    IndexKind {
+        name: "bounds-quadtree",
+        summary: "the same over the ground",
+        build: |entries| bounds_octree(entries, usual(Split::Quadrants, entries)),
+    },
+    IndexKind {
+        name: "extents-octree",
+        summary: "Octree 3b of Wortel 2011: buckets, nodes as large as their largest object asks",
+        build: |entries| extents_octree(entries, usual(Split::Octants, entries)),
+    },
+    IndexKind {
+        name: "extents-quadtree",
+        summary: "the same over the ground",
+        build: |entries| extents_octree(entries, usual(Split::Quadrants, entries)),
+    },
+    IndexKind {
+        name: "radius-octree",
+        summary: "Octree 3bR of Wortel 2011: the same, but for one radius on all axes",
+        build: |entries| radius_octree(entries, usual(Split::Octants, entries)),
+    },
+    IndexKind {
+        name: "radius-quadtree-lazy",
+        summary: "Octree 3bR over the ground, with depth reduction and object checklists",
+        build: |entries| {
+            let knobs = TreeKnobs { start_depth: 3, ..usual(Split::Quadrants, entries) };
+            radius_octree(entries, knobs.reduced(REDUCTION))
+        },
+    },
+    IndexKind {
+        name: "loose-octree",
+        summary: "Octree 4 of Wortel 2011: middles say where, sizes how deep",
+        build: |entries| {
+            loose_octree(entries, usual(Split::Octants, entries), LooseKnobs::default())
+        },
+    },
+    IndexKind {
+        name: "loose-octree-lazy",
+        summary: "the same with depth reduction and object checklists",
+        build: |entries| {
+            let knobs = usual(Split::Octants, entries).reduced(REDUCTION);
+            loose_octree(entries, knobs, LooseKnobs::default())
+        },
+    },
+    IndexKind {
+        name: "loose-quadtree-lazy",
+        summary: "the same over the ground",
+        build: |entries| {
+            let knobs = usual(Split::Quadrants, entries).reduced(REDUCTION);
+            loose_octree(entries, knobs, LooseKnobs::default())
+        },
     },
 ];

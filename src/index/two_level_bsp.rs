@@ -17,10 +17,12 @@
 //! where many objects straddle the upper planes: they hang near the root and are looked at in every
 //! frame.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 
-use super::{Entry, Index, Move, Node, NodeId};
-use crate::math::Aabb;
+use super::{Entry, Index, Moves, Node, NodeId, Work, find_by_nodes};
+use crate::math::{Aabb, Volume};
 use crate::part::ObjectId;
 
 /// A node with no more objects than this is not parted any further.
@@ -73,6 +75,7 @@ pub struct TwoLevelBsp {
     stale: bool,
     /// Whether the latest update took an object across the root.
     crossed_root: bool,
+    work: Work,
 }
 
 impl TwoLevelBsp {
@@ -93,6 +96,7 @@ impl TwoLevelBsp {
             moved_in: 0,
             stale: false,
             crossed_root: false,
+            work: Work::default(),
         };
         let all: Vec<u32> = (0..entries.len() as u32).collect();
         let root = tree.node_for(space, None);
@@ -356,34 +360,37 @@ impl Index for TwoLevelBsp {
         "two-level-bsp"
     }
 
-    fn update(&mut self, moves: &[Move]) {
+    fn update(&mut self, moves: Moves<'_>) {
         self.updates += 1;
         self.rebuilt.clear();
         self.crossed_root = false;
-        if !moves.is_empty() {
+        if !moves.moved.is_empty() {
             (self.moved_in, self.stale) = (self.updates, true);
         }
-        for change in moves {
-            let old = self.node_of_object[change.object.0 as usize];
+        for &object in moves.moved {
+            let bounds = *moves.bounds(object);
+            let old = self.node_of_object[object.0 as usize];
             let mut node = old;
-            while !self.nodes[node.0 as usize].space.contains(&change.bounds) {
+            while !self.nodes[node.0 as usize].space.contains(&bounds) {
                 let Some(parent) = self.nodes[node.0 as usize].parent else { break };
+                self.work.steps += 1;
                 node = parent;
             }
-            let node = self.home(node, &change.bounds);
+            let node = self.home(node, &bounds);
             self.touch(old);
+            *if node == old { &mut self.work.ok } else { &mut self.work.updates } += 1;
             // Unlinking needs the old box, to know whether the object had escaped.
             if node != old || node == NodeId(0) {
                 self.crossed_root |= match [old, node].map(|node| self.below_root(node)) {
                     [Some(from), Some(to)] => from != to,
                     _ => false,
                 };
-                self.unlink(change.object);
-                self.bounds[change.object.0 as usize] = change.bounds;
-                self.link(change.object, node);
+                self.unlink(object);
+                self.bounds[object.0 as usize] = bounds;
+                self.link(object, node);
                 self.touch(node);
             } else {
-                self.bounds[change.object.0 as usize] = change.bounds;
+                self.bounds[object.0 as usize] = bounds;
             }
         }
         if self.stale && self.updates.is_multiple_of(RECONSTRUCTION_PERIOD) {
@@ -391,6 +398,25 @@ impl Index for TwoLevelBsp {
             self.reconstruct();
         }
         self.tighten();
+    }
+
+    fn find(&mut self, _: &[Aabb], volume: &Volume, found: &mut Vec<ObjectId>) {
+        let mut work = self.work;
+        find_by_nodes(self, volume, &mut work, found);
+        self.work = work;
+    }
+
+    fn work(&self) -> Work {
+        self.work
+    }
+
+    fn heap_bytes(&self) -> usize {
+        let objects: usize = self.nodes.iter().map(|node| node.objects.capacity()).sum();
+        self.nodes.capacity() * size_of::<BspNode>()
+            + objects * size_of::<ObjectId>()
+            + self.bounds.capacity() * size_of::<Aabb>()
+            + (self.node_of_object.capacity() + self.free.capacity() + self.order.capacity())
+                * size_of::<NodeId>()
     }
 
     fn crossed_root(&self) -> bool {
@@ -401,8 +427,8 @@ impl Index for TwoLevelBsp {
         &self.rebuilt
     }
 
-    fn top_down(&self) -> &[NodeId] {
-        &self.order
+    fn top_down(&self) -> Cow<'_, [NodeId]> {
+        Cow::Borrowed(&self.order)
     }
 
     fn node_count(&self) -> u32 {
@@ -432,7 +458,10 @@ impl Index for TwoLevelBsp {
         self.nodes[node.0 as usize].parent
     }
 
-    fn check(&self) -> Result<(), String> {
+    fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
+        if self.bounds != boxes {
+            return Err("an object is not where it was said to be".to_owned());
+        }
         let mut seen = vec![0_u32; self.bounds.len()];
         let mut escaped = 0;
         if self.order.len() + self.free.len() != self.nodes.len() {

@@ -8,6 +8,7 @@ mod hull;
 mod inflate;
 mod margins;
 mod trig;
+mod volume;
 
 pub use aabb::{Aabb, TRANSFORM_MARGIN};
 pub use clip_box::{
@@ -20,3 +21,4 @@ pub use hull::{
 pub use inflate::{BOX_DEPTH_SLACK, BOX_DILATION_PIXELS, inflated_box, inflated_box_with};
 pub use margins::Margins;
 pub use trig::{cos, sin, tan};
+pub use volume::{Meets, Volume};

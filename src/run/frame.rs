@@ -11,11 +11,16 @@ use plainsight_reference::fast::Options;
 use super::Moment;
 use crate::cull::{ObjectView, View};
 use crate::effect;
-use crate::index::{Entry, Move};
+use crate::index::{Entry, Moves};
 use crate::math::{Aabb, ClipError, rounded_clip_matrix};
 use crate::oracle::{MemoryKnobs, OracleError, Stage, least_budget};
 use crate::part::{Cache, Made, ObjectId, PartedMesh, Partition, PartitionKnobs};
 use crate::scene::{Camera, Object, Scene};
+
+/// How far the box of a moved object may be from where exact arithmetic puts it, relative to the largest
+/// numbers it is made of: a position takes some ten f64 operations, a box is rounded outward by
+/// [`TRANSFORM_MARGIN`](crate::math::TRANSFORM_MARGIN) of the same; 2⁻⁴⁰ is a thousand times both.
+const BOUND_SLACK: f64 = 1.0 / (1_u64 << 40) as f64;
 
 /// A scene ready to run: cut into parts, its declared effects built.
 pub struct World {
@@ -168,12 +173,27 @@ impl World {
     #[must_use]
     pub fn entries(&self) -> Vec<Entry> {
         let state = FrameState::first(self);
-        let bound = |object: usize| self.effects.step_bound(object as u32);
-        let entry = |(object, view): (usize, &ObjectView)| Entry {
-            bounds: view.bounds,
-            step_bound: bound(object),
+        (0..).zip(state.boxes).map(|(object, bounds)| self.entry(object, bounds)).collect()
+    }
+
+    fn entry(&self, object: u32, bounds: Aabb) -> Entry {
+        let own = self.partition.mesh(ObjectId(object)).bounds;
+        if own.is_empty() {
+            return Entry { bounds, step_bound: 0.0, reach: 0.0 };
+        }
+        let rest = self.rest[object as usize].world_from_object;
+        let middle = rest.transform_vector3(own.center()).length();
+        // However it turns, no corner is farther from the middle than in the scene's own placement.
+        let reach = if self.effects.turns(object) {
+            let arm = |corner: DVec3| rest.transform_vector3(corner - own.center()).length();
+            own.corners().into_iter().map(arm).fold(0.0, f64::max)
+        } else {
+            bounds.size().max_element() * 0.5
         };
-        state.objects.iter().enumerate().map(entry).collect()
+        let step = self.effects.step_bound(object, middle);
+        let slack = (reach + middle + step + self.effects.extent(object)) * BOUND_SLACK;
+        let step_bound = if step > 0.0 { step + slack } else { 0.0 };
+        Entry { bounds, step_bound, reach: reach + slack }
     }
 }
 
@@ -190,8 +210,12 @@ pub struct FrameState {
     pub objects: Vec<ObjectView>,
     /// Object-to-clip matrices as renderers take them.
     pub matrices: Vec<[f32; 16]>,
-    /// What changed since t − 1; empty at t = 0.
-    pub moves: Vec<Move>,
+    /// World boxes of the objects, by id.
+    pub boxes: Vec<Aabb>,
+    /// Objects that are not where they were at t − 1, ascending; none at t = 0.
+    pub moved: Vec<ObjectId>,
+    /// Those of them that jumped.
+    pub jumped: Vec<ObjectId>,
     /// What effects took to get here; nothing in a scene without any.
     pub work: FrameWork,
 }
@@ -252,27 +276,32 @@ impl FrameState {
             }
         };
         let objects: Vec<ObjectView> = (0..).zip(&world.rest).map(view).collect();
-        let moved = |&object: &u32| {
-            let bounds = objects[object as usize].bounds;
-            let jumped = world.effects.jumped(object, tick);
-            Move { object: ObjectId(object), bounds, jumped }
-        };
+        let boxes = objects.iter().map(|object| object.bounds).collect();
         // Things at rest between two moves are not named: boxes tighten about them.
         let mut differs = |&&object: &&u32| {
             let mut at = |tick: u32| world.effects.placement(object, tick, &mut work.effects);
             at(tick) != at(tick - 1)
         };
         let moving = if t == 0 { &[] } else { world.effects.moving() };
-        let moves: Vec<Move> = moving.iter().filter(&mut differs).map(moved).collect();
-        work.moves = moves.len() as u64;
+        let moved: Vec<ObjectId> =
+            moving.iter().filter(&mut differs).map(|&object| ObjectId(object)).collect();
+        let jumps = |id: &&ObjectId| world.effects.jumped(id.0, tick);
+        let jumped = moved.iter().filter(jumps).copied().collect();
+        work.moves = moved.len() as u64;
         let matrices = objects.iter().map(|o| rounded_clip_matrix(&o.clip_from_object)).collect();
-        Self { moment, camera, clip_from_world, objects, matrices, moves, work }
+        Self { moment, camera, clip_from_world, objects, matrices, boxes, moved, jumped, work }
     }
 
     /// The first view of frame 0.
     #[must_use]
     pub fn first(world: &World) -> Self {
         Self::at(world, Moment { frame: 0, view: 0 })
+    }
+
+    /// As an index sees it.
+    #[must_use]
+    pub fn moves(&self) -> Moves<'_> {
+        Moves { boxes: &self.boxes, moved: &self.moved, jumped: &self.jumped }
     }
 
     /// As a culler sees it.
@@ -286,7 +315,7 @@ impl FrameState {
             camera: self.camera,
             clip_from_world: self.clip_from_world,
             objects: &self.objects,
-            moves: &self.moves,
+            moves: self.moves(),
             partition: &world.partition,
         }
     }

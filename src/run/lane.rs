@@ -219,7 +219,7 @@ fn shoot(
     let Finished { drawn, counts, events_hash, situations, events } = pen.finish()?;
     let wall_ns = start.elapsed().as_nanos() as u64;
     if cfg!(debug_assertions)
-        && let Err(broken) = culler.check()
+        && let Err(broken) = culler.check(&state.boxes)
     {
         panic!("{} broke its invariants in {}: {broken}", culler.name(), state.moment);
     }

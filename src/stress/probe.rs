@@ -156,10 +156,10 @@ impl Watch {
         self.reached.note(Probe::NothingShows, truth.visible_parts == 0);
         self.reached.note(Probe::EverythingShows, all);
         self.before[view] = shows;
-        self.reached.note(Probe::Jumped, state.moves.iter().any(|this| this.jumped));
+        self.reached.note(Probe::Jumped, !state.jumped.is_empty());
         let union = || state.objects.iter().fold(Aabb::EMPTY, |all, o| all.union(&o.bounds));
         let space = *self.space.get_or_insert_with(union);
-        let out = state.moves.iter().any(|this| !space.contains(&this.bounds));
+        let out = state.moved.iter().any(|id| !space.contains(&state.boxes[id.0 as usize]));
         self.reached.note(Probe::LeftSpace, out);
         let bounds = || state.objects.iter().map(|object| object.bounds);
         let eye = state.camera.eye;

@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 use plainsight::cull::{CullerSetup, Item, ProxyKind, Scenery, SceneryKnobs};
-use plainsight::index::{Entry, INDEXES, Index, Move, NodeId};
-use plainsight::math::Aabb;
+use plainsight::index::{Entry, INDEXES, Index, Moves, NodeId};
+use plainsight::math::{Aabb, Volume};
 use plainsight::oracle::CostModel;
 use plainsight::part::ObjectId;
 use plainsight::run::{FrameState, Moment};
-use plainsight::scene::Stream;
+use plainsight::scene::{Camera, DepthOrder, Lens, Stream, Viewport};
 
 use crate::common::world;
 
@@ -50,43 +50,162 @@ fn walk(index: &dyn Index, boxes: &[Aabb], eye: DVec3) -> Vec<ObjectId> {
     found
 }
 
-#[test]
-fn invariants_hold_after_every_step() {
-    for kind in INDEXES {
-        for (seed, count) in [(1, 0), (2, 1), (3, 2), (4, 50), (5, 300)] {
-            let mut stream = Stream::new(seed, "boxes");
-            let mut boxes: Vec<Aabb> = (0..count).map(|_| random_box(&mut stream, 20.0)).collect();
-            let entry = |&bounds: &Aabb| Entry { bounds, step_bound: 1.0 };
-            let entries: Vec<Entry> = boxes.iter().map(entry).collect();
-            let mut index = (kind.build)(&entries);
-            let all: Vec<ObjectId> = (0..count as u32).map(ObjectId).collect();
-            for step in 0..30 {
-                index
-                    .check()
-                    .unwrap_or_else(|broken| panic!("{} {seed} {step}: {broken}", kind.name));
-                let eye = DVec3::splat(stream.range(-30.0, 30.0));
-                assert_eq!(walk(index.as_ref(), &boxes, eye), all, "{} {seed} {step}", kind.name);
-                let mut moves = Vec::new();
-                for object in 0..count as u32 {
-                    if stream.below(3) == 0 {
-                        // Every fifth step leaves the space, and comes back.
-                        let reach = if step % 5 == 4 { 60.0 } else { 20.0 };
-                        boxes[object as usize] = random_box(&mut stream, reach);
-                        let bounds = boxes[object as usize];
-                        moves.push(Move { object: ObjectId(object), bounds, jumped: true });
-                    }
-                }
-                index.update(&moves);
+/// Boxes that wander: some stand, some step, some turn, some jump now and then, and leave the space.
+struct Wanderers {
+    stream: Stream,
+    boxes: Vec<Aabb>,
+    entries: Vec<Entry>,
+    moved: Vec<ObjectId>,
+    jumped: Vec<ObjectId>,
+}
+
+/// The farthest that a wanderer steps, by its number.
+fn step_of(object: usize) -> f64 {
+    [0.0, 0.01, 0.3, 2.0][object % 4]
+}
+
+impl Wanderers {
+    fn new(seed: u64, count: usize) -> Self {
+        let mut stream = Stream::new(seed, "boxes");
+        let boxes: Vec<Aabb> = (0..count).map(|_| random_box(&mut stream, 20.0)).collect();
+        let entry = |(object, &bounds): (usize, &Aabb)| {
+            // Every box may become a cube of its largest side.
+            let reach = 2.0 * (1.0 + 1e-12);
+            Entry { bounds, step_bound: step_of(object) * (1.0 + 1e-9), reach }
+        };
+        let entries = boxes.iter().enumerate().map(entry).collect();
+        Self { stream, boxes, entries, moved: Vec::new(), jumped: Vec::new() }
+    }
+
+    fn step(&mut self) {
+        (self.moved.clear(), self.jumped.clear());
+        for object in 0..self.boxes.len() {
+            let id = ObjectId(object as u32);
+            let (step, this) = (step_of(object), &mut self.boxes[object]);
+            let stream = &mut self.stream;
+            if stream.below(40) == 0 {
+                let reach = if stream.below(4) == 0 { 60.0 } else { 20.0 };
+                *this = random_box(stream, reach);
+                (self.moved.push(id), self.jumped.push(id));
+            } else if step > 0.0 && stream.below(3) > 0 {
+                let mut any = |r: f64| stream.range(-r, r);
+                // On the whole away from the middle, so that many leave the space.
+                let by = DVec3::new(any(step), any(step), any(step)) / 3.0_f64.sqrt();
+                let out = this.center() * 1e-3;
+                let by = if out.length() + by.length() <= step { by + out } else { by };
+                let half = (this.size() * 0.5 * stream.range(0.9, 1.1)).min(DVec3::splat(2.0));
+                let center = this.center() + by;
+                *this = Aabb::new(center - half, center + half);
+                self.moved.push(id);
             }
         }
     }
+
+    fn moves(&self) -> Moves<'_> {
+        Moves { boxes: &self.boxes, moved: &self.moved, jumped: &self.jumped }
+    }
+
+    /// A camera anywhere, looking anywhere, with a limit of any distance.
+    fn volume(&mut self) -> Volume {
+        let stream = &mut self.stream;
+        let mut point =
+            |r: f64| DVec3::new(stream.range(-r, r), stream.range(-r, r), stream.range(-r, r));
+        let (eye, target) = (point(30.0), point(20.0));
+        let far = stream.range(5.0, 60.0);
+        let camera = Camera {
+            eye,
+            forward: (target - eye).normalize(),
+            lens: Lens::perspective(stream.range(0.3, 1.8)),
+            near: 0.1,
+            far,
+        };
+        let order = [DepthOrder::Forward, DepthOrder::Reversed][stream.below(2) as usize];
+        Volume::new(&camera.clip_from_world(Viewport { width: 400, height: 300 }, order), order)
+    }
+}
+
+/// Every structural promise after every step; every object once in a walk, inside its nodes' boxes; and
+/// what is found is what a look at every box finds, or more.
+#[test]
+fn invariants_hold_after_every_step() {
+    for kind in INDEXES {
+        let (mut found_all, mut exact_all) = (0, 0);
+        for (seed, count) in [(1, 0), (2, 1), (3, 2), (4, 50), (5, 300)] {
+            let mut crowd = Wanderers::new(seed, count);
+            let mut index = (kind.build)(&crowd.entries);
+            let all: Vec<ObjectId> = (0..count as u32).map(ObjectId).collect();
+            for step in 0..60 {
+                let at = format!("{} seed {seed} step {step}", kind.name);
+                let check = |index: &dyn Index, boxes: &[Aabb]| {
+                    index.check(boxes).unwrap_or_else(|broken| panic!("{at}: {broken}"));
+                };
+                check(index.as_ref(), &crowd.boxes);
+                let volume = crowd.volume();
+                let (mut found, mut exact) = (Vec::new(), Vec::new());
+                if step % 3 == 0 {
+                    index.refine(&crowd.boxes, &volume);
+                    check(index.as_ref(), &crowd.boxes);
+                }
+                index.find(&crowd.boxes, &volume, &mut found);
+                check(index.as_ref(), &crowd.boxes);
+                exact.extend(all.iter().filter(|o| volume.touches(&crowd.boxes[o.0 as usize])));
+                found.sort_unstable();
+                assert!(found.is_sorted_by(|a, b| a < b), "{at}: found twice");
+                let missed = exact.iter().find(|id| found.binary_search(id).is_err());
+                assert_eq!(missed, None, "{at}");
+                (found_all, exact_all) = (found_all + found.len(), exact_all + exact.len());
+                let eye = DVec3::splat(crowd.stream.range(-30.0, 30.0));
+                assert_eq!(walk(index.as_ref(), &crowd.boxes, eye), all, "{at}");
+                crowd.step();
+                index.update(crowd.moves());
+            }
+        }
+        assert!(exact_all > 4000, "{}: {exact_all} in sight", kind.name);
+        println!("{}: found {found_all} of {exact_all}", kind.name);
+    }
+}
+
+/// Bounds that a scene gives of its objects' steps and sides hold in every frame.
+#[test]
+fn bounds_on_steps_and_sides_hold() {
+    let mut moves = 0;
+    for (name, scale) in [("city", 0.2), ("bunnies", 0.1), ("hard/teleports", 1.0), ("swarm", 1.0)]
+    {
+        for seed in 1..4 {
+            let world = world(name, seed, scale, 80);
+            let entries = world.entries();
+            let mut before: Option<FrameState> = None;
+            for frame in 0..80 {
+                let state = FrameState::at(&world, Moment { frame, view: 0 });
+                for (id, (bounds, entry)) in state.boxes.iter().zip(&entries).enumerate() {
+                    if bounds.is_empty() {
+                        continue;
+                    }
+                    let at = format!("{name} seed {seed} frame {frame} object {id}");
+                    assert!(bounds.size().max_element() * 0.5 <= entry.reach, "{at}");
+                    let id = ObjectId(id as u32);
+                    if let Some(before) = &before
+                        && !state.jumped.contains(&id)
+                    {
+                        let was = before.boxes[id.0 as usize].center();
+                        assert!(was.distance(bounds.center()) <= entry.step_bound, "{at}");
+                        assert!(state.moved.contains(&id) || was == bounds.center(), "{at}");
+                        moves += u32::from(was != bounds.center());
+                    }
+                }
+                before = Some(state);
+            }
+        }
+    }
+    assert!(moves > 1000, "{moves}");
 }
 
 #[test]
 fn the_nearer_child_comes_first() {
     let at = |x: f64| Aabb::new(DVec3::new(x, 0.0, 0.0), DVec3::new(x + 1.0, 1.0, 1.0));
-    let entries: Vec<Entry> =
-        (0..8).map(|i| Entry { bounds: at(f64::from(i) * 2.0), step_bound: 0.0 }).collect();
+    let entries: Vec<Entry> = (0..8)
+        .map(|i| Entry { bounds: at(f64::from(i) * 2.0), step_bound: 0.0, reach: 1.0 })
+        .collect();
     let index = (INDEXES[0].build)(&entries);
     for eye in [DVec3::new(-5.0, 0.0, 0.0), DVec3::new(50.0, 0.0, 0.0)] {
         let mut children = Vec::new();
@@ -122,7 +241,7 @@ fn rebuilt_nodes_inherit_what_was_visible() {
     for t in 0..40 {
         let state = FrameState::at(&world, Moment { frame: t, view: 0 });
         scenery.begin_frame(&state.view(&world), &mut visible_after);
-        beside.update(&state.moves);
+        beside.update(state.moves());
         let of = |item| visible_after[scenery.slot(item)];
         for &node in beside.rebuilt() {
             let visible = |object| of(Item::Object(object, 0)) == t;

@@ -74,7 +74,7 @@ impl Culler for Forgets {
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
         let moved = |part: PartId| {
             let (object, _): (ObjectId, u32) = view.partition.locate(part);
-            view.moves.iter().any(|this| this.object == object)
+            view.moves.has(object)
         };
         let parts = (0..view.partition.part_count()).map(PartId);
         parts.filter(|&part| view.frame < 2 || !moved(part)).for_each(|part| pen.draw(part));
