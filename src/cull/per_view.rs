@@ -9,6 +9,8 @@ use crate::oracle::OracleError;
 /// Hands each view to the culler of that number.
 pub struct PerView {
     cullers: Vec<Box<dyn Culler>>,
+    /// Which view was drawn last: the others know nothing of this frame yet.
+    latest: usize,
 }
 
 impl PerView {
@@ -17,7 +19,7 @@ impl PerView {
     pub fn over(views: u32, make: impl Fn() -> Box<dyn Culler>) -> Box<dyn Culler> {
         let cullers: Vec<_> = (0..views.max(1)).map(|_| make()).collect();
         if cullers.len() > 1 {
-            return Box::new(Self { cullers });
+            return Box::new(Self { cullers, latest: 0 });
         }
         cullers.into_iter().next().expect("there is at least one view")
     }
@@ -29,11 +31,12 @@ impl Culler for PerView {
     }
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
-        self.cullers[view.view as usize].frame(view, pen)
+        self.latest = view.view as usize;
+        self.cullers[self.latest].frame(view, pen)
     }
 
     fn check(&self, boxes: &[Aabb]) -> Result<(), String> {
-        self.cullers.iter().try_for_each(|culler| culler.check(boxes))
+        self.cullers[self.latest].check(boxes)
     }
 
     fn scenery(&self, view: u32) -> Option<&Scenery> {
