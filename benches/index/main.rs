@@ -7,7 +7,7 @@
 use std::time::Instant;
 
 use glam::DVec3;
-use plainsight::index::{Entry, INDEXES, Move};
+use plainsight::index::{Entry, INDEXES, Moves};
 use plainsight::math::Aabb;
 use plainsight::part::ObjectId;
 use plainsight::scene::Stream;
@@ -18,7 +18,7 @@ const FRAMES: usize = 200;
 const RUNS: usize = 7;
 
 /// Boxes of half-side up to 1 on straight lines in a box of mean density one, mirrored at its walls.
-fn moves(count: u32) -> Vec<Vec<Move>> {
+fn frames(count: u32) -> Vec<Vec<Aabb>> {
     let side = 0.9 * f64::from(count).cbrt();
     let mut stream = Stream::new(1, "motion");
     let mut point =
@@ -34,14 +34,7 @@ fn moves(count: u32) -> Vec<Vec<Move>> {
         let center = DVec3::new(wave(free.x), wave(free.y), wave(free.z));
         Aabb::new(center - half, center + half)
     };
-    let frame = |frame: usize| {
-        let object = |(i, &object): (usize, &[DVec3; 3])| Move {
-            object: ObjectId(i as u32),
-            bounds: at(frame, object),
-            jumped: false,
-        };
-        objects.iter().enumerate().map(object).collect()
-    };
+    let frame = |frame| objects.iter().map(|&object| at(frame, object)).collect();
     (0..FRAMES).map(frame).collect()
 }
 
@@ -50,20 +43,23 @@ fn main() {
     let counts = if named.is_empty() { vec![300, 10_000] } else { named };
     println!("{:<16} {:>9} {:>16} {:>16}", "index", "objects", "ns an object", "us a frame");
     for count in counts {
-        let frames = moves(count);
-        let entries: Vec<Entry> =
-            frames[0].iter().map(|m| Entry { bounds: m.bounds, step_bound: 0.14 }).collect();
+        let frames = frames(count);
+        let moved: Vec<ObjectId> = (0..count).map(ObjectId).collect();
+        let moves = |boxes| Moves { boxes, moved: &moved, jumped: &[] };
+        // Half sides are up to 1, but for their rounding.
+        let entry = |&bounds: &Aabb| Entry { bounds, step_bound: 0.14, reach: 1.0 + 1e-9 };
+        let entries: Vec<Entry> = frames[0].iter().map(entry).collect();
         for kind in INDEXES {
             let mut index = (kind.build)(&entries);
-            for moves in &frames[1..] {
-                index.update(moves);
-                index.check().expect("an index keeps its promises");
+            for boxes in &frames[1..] {
+                index.update(moves(boxes));
+                index.check(boxes).expect("an index keeps its promises");
             }
             let mut times: Vec<f64> = (0..RUNS)
                 .map(|_| {
                     let mut index = (kind.build)(&entries);
                     let start = Instant::now();
-                    frames[1..].iter().for_each(|moves| index.update(moves));
+                    frames[1..].iter().for_each(|boxes| index.update(moves(boxes)));
                     start.elapsed().as_secs_f64()
                 })
                 .collect();

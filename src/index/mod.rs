@@ -11,7 +11,7 @@ mod tree;
 mod two_level_bsp;
 
 use std::borrow::Cow;
-use std::ops::Sub;
+use std::ops::{Add, Sub};
 
 use glam::DVec3;
 
@@ -87,6 +87,21 @@ pub struct Work {
     pub object_checks: u64,
     /// Objects that were moved down when their node was looked at.
     pub lowered: u64,
+}
+
+impl Add for Work {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            ok: self.ok + other.ok,
+            updates: self.updates + other.updates,
+            steps: self.steps + other.steps,
+            node_checks: self.node_checks + other.node_checks,
+            object_checks: self.object_checks + other.object_checks,
+            lowered: self.lowered + other.lowered,
+        }
+    }
 }
 
 impl Sub for Work {

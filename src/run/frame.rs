@@ -235,10 +235,7 @@ impl Add for FrameWork {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
-        let effects = effect::Work {
-            motion: self.effects.motion + other.effects.motion,
-            teleport: self.effects.teleport + other.effects.teleport,
-        };
+        let effects = self.effects + other.effects;
         Self { effects, boxes: self.boxes + other.boxes, moves: self.moves + other.moves }
     }
 }

@@ -24,7 +24,12 @@
 //! shear = [0.5,0,0]                        # x leans with y, x with z, y with z
 //! reflect = { velocity = [1,0,0], min = [-5,0,0], max = [5,0,0], spin = 0.1 }
 //! # circuit = { corners = [[0,0,0], [9,0,0]], speed = 0.5, start = 2 }    # in the place of reflect
+//! # lap = { center = [0,0,0], half = [9,5], round = 1, speed = 0.5, start = 2 }
 //! jumps = { offsets = [[0,0,0], [0,9,0]], period = 4 }
+//! [[figures]]                              # objects that are limbs of one body
+//! lap = { center = [0,0,0], half = [9,5], round = 1, speed = 0.5 }    # or reflect with at, or circuit
+//! pace = 0.2                               # radians of the swing a frame; phase = 1 is where it starts
+//! limbs = [{ object = 0, joints = [{ hinge = [0,1,0], swing = 0.5, phase = 0 }] }]
 //! [camera_path]
 //! poses = [{ eye = [0,0,5], target = [0,0,0] }]
 //! travel = "jump"                          # or "glide", the default
@@ -48,9 +53,10 @@ use glam::{DQuat, DVec3};
 use serde::Deserialize;
 
 use super::generate::{self, CameraMode, Knobs};
+use super::inline_motion::{self, InlineCircuit, InlineFigure, InlineLap, InlineReflect};
 use super::{
-    CameraPath, CameraPose, DepthOrder, Effects, Jumps, Lens, Mesh, Motion, Object, Path as Way,
-    Placement, Scene, SceneError, Teleport, Travel, Viewport,
+    CameraPath, CameraPose, DepthOrder, Effects, Jumps, Lens, Mesh, Motion, Object, Placement,
+    Scene, SceneError, Teleport, Travel, Viewport,
 };
 
 /// The only version there is.
@@ -78,6 +84,8 @@ struct SceneFile {
     camera: Option<CameraName>,
     #[serde(default)]
     objects: Vec<InlineObject>,
+    #[serde(default)]
+    figures: Vec<InlineFigure>,
     camera_path: Option<InlinePath>,
     #[serde(default)]
     views: Vec<InlinePath>,
@@ -112,6 +120,7 @@ struct InlineObject {
     shear: [f64; 3],
     reflect: Option<InlineReflect>,
     circuit: Option<InlineCircuit>,
+    lap: Option<InlineLap>,
     jumps: Option<InlineJumps>,
 }
 
@@ -120,25 +129,6 @@ struct InlineObject {
 struct InlineJumps {
     offsets: Vec<[f64; 3]>,
     period: u32,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct InlineCircuit {
-    corners: Vec<[f64; 3]>,
-    speed: f64,
-    #[serde(default)]
-    start: f64,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct InlineReflect {
-    velocity: [f64; 3],
-    min: [f64; 3],
-    max: [f64; 3],
-    #[serde(default)]
-    spin: f64,
 }
 
 #[derive(Clone, Copy, Default, Deserialize)]
@@ -282,30 +272,9 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
             shear: object.shear.into(),
         };
         objects.push(Object { mesh: number as u32, placement });
-        if let Some(InlineReflect { velocity, min, max, spin }) = object.reflect {
-            if !([velocity, min, max].as_flattened().iter().all(|c| c.is_finite())
-                && spin.is_finite())
-            {
-                return Err(format!("object {number}: its motion must be finite"));
-            }
-            let way =
-                Way::Reflect { velocity: velocity.into(), min: min.into(), max: max.into(), spin };
-            movers.push((number as u32, way));
-        }
-        if let Some(InlineCircuit { corners, speed, start }) = object.circuit {
-            let finite =
-                corners.as_flattened().iter().chain([&speed, &start]).all(|c| c.is_finite());
-            if corners.len() < 2
-                || !finite
-                || movers.last().is_some_and(|(o, _)| *o == number as u32)
-            {
-                return Err(format!(
-                    "object {number}: a circuit has at least two corners, finite numbers, and no reflect beside it"
-                ));
-            }
-            let corners = corners.into_iter().map(DVec3::from).collect();
-            movers.push((number as u32, Way::Circuit { corners, speed, start }));
-        }
+        let place = format!("object {number}");
+        let way = inline_motion::path(&place, object.reflect, object.circuit, object.lap)?;
+        movers.extend(way.map(|way| (number as u32, way)));
         if let Some(InlineJumps { offsets, period }) = object.jumps {
             if !offsets.as_flattened().iter().all(|c| c.is_finite()) {
                 return Err(format!("object {number}: its jumps must be finite"));
@@ -314,6 +283,8 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
             jumpers.push((number as u32, Jumps { offsets, period }));
         }
     }
+    let moving: Vec<u32> = movers.iter().map(|(object, _)| *object).collect();
+    let articulated = inline_motion::articulated(file.figures, objects.len(), &moving)?;
     Ok(Scene {
         name: file.name.unwrap_or_else(|| "inline".to_owned()),
         seed: chosen.seed,
@@ -327,6 +298,7 @@ fn inline(file: SceneFile, knobs: &Knobs) -> Result<Scene, String> {
         start: file.start,
         effects: Effects {
             motion: (!movers.is_empty()).then_some(Motion { movers }),
+            articulated,
             teleport: (!jumpers.is_empty()).then_some(Teleport { jumpers }),
         },
     })
@@ -432,6 +404,18 @@ mod tests {
             ),
             (&INLINE.replace("target = [0,0,0]", "target = [0,0,5]"), "finite and differ"),
             (&INLINE.replace("[1,0,0]", "[nan,0,0]"), "not finite"),
+            (
+                &INLINE.replace("[camera_path]", "lap = { center = [0,0,0], half = [0,1], round = 1, speed = 1 }\n[camera_path]"),
+                "object 0: a lap has finite numbers",
+            ),
+            (
+                &INLINE.replace("[camera_path]", "[[figures]]\nlimbs = []\n[camera_path]"),
+                "figure 0: needs one of reflect",
+            ),
+            (
+                &INLINE.replace("[camera_path]", "[[figures]]\ncircuit = { corners = [[0,0,0],[1,0,0]], speed = 1 }\nlimbs = [{ object = 1 }]\n[camera_path]"),
+                "figure 0: object 1 does not exist",
+            ),
             (&two_views().replace("near = 2", "near = 20"), "view 1: needs 0 < near < far"),
         ] {
             let error = read(text).unwrap_err();

@@ -9,6 +9,7 @@ mod camera;
 pub mod file;
 pub mod generate;
 pub mod import;
+mod inline_motion;
 mod stream;
 mod write;
 
@@ -136,8 +137,53 @@ pub struct Object {
 pub struct Effects {
     /// Objects that move.
     pub motion: Option<Motion>,
+    /// Figures whose limbs swing.
+    pub articulated: Option<Articulated>,
     /// Objects that jump.
     pub teleport: Option<Teleport>,
+}
+
+/// Figures of several objects.
+#[derive(Clone, Debug, Default)]
+pub struct Articulated {
+    /// In any order. An object is the limb of at most one figure, and then has no path of its own.
+    pub figures: Vec<Figure>,
+}
+
+/// A body on a path, and the limbs that hang on it.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// Where the body's origin goes; its x axis faces along it.
+    pub path: Path,
+    /// Where the body's origin is at t = 0, for a path that has no place of its own ([`Path::Reflect`]).
+    pub start: DVec3,
+    /// Radians a frame of the swing of all joints.
+    pub pace: f64,
+    /// Radians of the swing at t = 0.
+    pub phase: f64,
+    /// The limbs.
+    pub limbs: Vec<Limb>,
+}
+
+/// An object of a figure. Of its placement the rotation and scale hold in the frame of its last joint; the
+/// translation is where it stands if nothing moves.
+#[derive(Clone, Debug)]
+pub struct Limb {
+    /// The object.
+    pub object: u32,
+    /// From the body outwards; figures may share them.
+    pub joints: Arc<[Joint]>,
+}
+
+/// A hinge, about whose z axis what hangs on it swings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint {
+    /// Place in the frame of the joint before, or of the body.
+    pub hinge: DVec3,
+    /// Radians to either side; 0 for a stiff one.
+    pub swing: f64,
+    /// Radians that it is ahead of the figure.
+    pub phase: f64,
 }
 
 /// Which objects jump, and where to.
@@ -185,6 +231,20 @@ pub enum Path {
         /// World units a frame.
         speed: f64,
         /// World units along the polygon at t = 0.
+        start: f64,
+    },
+    /// Round a level rectangle with round corners at constant speed, facing along it, from +x to +z; t = 0
+    /// is at `start` from the low end of the side of lowest z.
+    Lap {
+        /// The middle, in the world.
+        center: DVec3,
+        /// Half sides along x and z, world units, above 0.
+        half: [f64; 2],
+        /// Radius of the corners, above 0; no larger than the smaller half side.
+        round: f64,
+        /// World units a frame.
+        speed: f64,
+        /// World units along the way at t = 0.
         start: f64,
     },
 }

@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use super::{CameraPath, DepthOrder, Lens, Mesh, Path, Placement, Scene, Travel};
+use super::{CameraPath, DepthOrder, Joint, Lens, Mesh, Path, Placement, Scene, Travel};
 
 /// The file's text. A scene without objects has none that can be read back: a file needs one.
 #[must_use]
@@ -31,18 +31,7 @@ pub fn to_toml(scene: &Scene) -> String {
         placement(&mut line, &object.placement);
         let movers = scene.effects.motion.iter().flat_map(|motion| &motion.movers);
         for (_, path) in movers.filter(|(object, _)| *object == number) {
-            line(match path {
-                Path::Reflect { velocity, min, max, spin } => format!(
-                    "reflect = {{ velocity = {}, min = {}, max = {}, spin = {spin:?} }}",
-                    numbers(&velocity.to_array()),
-                    numbers(&min.to_array()),
-                    numbers(&max.to_array())
-                ),
-                Path::Circuit { corners, speed, start } => format!(
-                    "circuit = {{ corners = {}, speed = {speed:?}, start = {start:?} }}",
-                    list(corners, |corner| numbers(&corner.to_array()))
-                ),
-            });
+            line(way(path));
         }
         let jumpers = scene.effects.teleport.iter().flat_map(|teleport| &teleport.jumpers);
         for (_, jumps) in jumpers.filter(|(object, _)| *object == number) {
@@ -50,11 +39,49 @@ pub fn to_toml(scene: &Scene) -> String {
             line(format!("jumps = {{ offsets = {offsets}, period = {} }}", jumps.period));
         }
     }
+    for figure in scene.effects.articulated.iter().flat_map(|articulated| &articulated.figures) {
+        line("\n[[figures]]".to_owned());
+        line(way(&figure.path));
+        line(format!("at = {}", numbers(&figure.start.to_array())));
+        line(format!("pace = {:?}\nphase = {:?}", figure.pace, figure.phase));
+        let joint = |joint: &Joint| {
+            let Joint { hinge, swing, phase } = joint;
+            let hinge = numbers(&hinge.to_array());
+            format!("{{ hinge = {hinge}, swing = {swing:?}, phase = {phase:?} }}")
+        };
+        line(format!(
+            "limbs = {}",
+            list(&figure.limbs, |limb| {
+                let joints = list(&limb.joints, joint);
+                format!("{{ object = {}, joints = {joints} }}", limb.object)
+            })
+        ));
+    }
     for (number, path) in scene.cameras.iter().enumerate() {
         line(if number == 0 { "\n[camera_path]" } else { "\n[[views]]" }.to_owned());
         camera(&mut line, path);
     }
     text
+}
+
+fn way(path: &Path) -> String {
+    match path {
+        Path::Reflect { velocity, min, max, spin } => format!(
+            "reflect = {{ velocity = {}, min = {}, max = {}, spin = {spin:?} }}",
+            numbers(&velocity.to_array()),
+            numbers(&min.to_array()),
+            numbers(&max.to_array())
+        ),
+        Path::Circuit { corners, speed, start } => format!(
+            "circuit = {{ corners = {}, speed = {speed:?}, start = {start:?} }}",
+            list(corners, |corner| numbers(&corner.to_array()))
+        ),
+        Path::Lap { center, half, round, speed, start } => format!(
+            "lap = {{ center = {}, half = {}, round = {round:?}, speed = {speed:?}, start = {start:?} }}",
+            numbers(&center.to_array()),
+            numbers(half)
+        ),
+    }
 }
 
 fn mesh(line: &mut dyn FnMut(String), mesh: &Mesh) {

@@ -5,7 +5,8 @@
 
 use std::sync::Arc;
 
-use crate::scene::{Mesh, Object, Scene};
+use crate::effect::EFFECTS;
+use crate::scene::{Limb, Mesh, Object, Scene};
 
 /// Rounds over all that can be left out, at most; one that leaves nothing more out ends it.
 const ROUNDS: u32 = 6;
@@ -95,22 +96,25 @@ impl Work<'_, '_> {
     }
 
     fn leave_out_effects(&mut self) {
-        if self.scene.effects.teleport.is_some() {
-            let mut still = self.scene.clone();
-            still.effects.teleport = None;
-            self.takes(still);
-        }
-        if self.scene.effects.motion.is_some() {
-            let mut still = self.scene.clone();
-            still.effects.motion = None;
-            self.takes(still);
+        for effect in EFFECTS.iter().rev() {
+            if (effect.declared)(&self.scene) {
+                let mut still = self.scene.clone();
+                (effect.take_out)(&mut still);
+                self.takes(still);
+            }
         }
         // Then each by itself.
         let count = |scene: &Scene| {
             let effects = &scene.effects;
             let jumpers = effects.teleport.as_ref().map_or(0, |teleport| teleport.jumpers.len());
-            (effects.motion.as_ref().map_or(0, |motion| motion.movers.len()), jumpers)
+            let figures = effects.articulated.as_ref().map_or(0, |all| all.figures.len());
+            (effects.motion.as_ref().map_or(0, |motion| motion.movers.len()), jumpers, figures)
         };
+        for place in (0..count(&self.scene).2).rev() {
+            let mut still = self.scene.clone();
+            still.effects.articulated.iter_mut().for_each(|all| drop(all.figures.remove(place)));
+            self.takes(still);
+        }
         for place in (0..count(&self.scene).0).rev() {
             let mut still = self.scene.clone();
             still.effects.motion.iter_mut().for_each(|motion| drop(motion.movers.remove(place)));
@@ -174,12 +178,22 @@ fn with_objects(scene: &Scene, keeps: impl Fn(usize) -> bool) -> Scene {
         let kept = kept.filter_map(|(object, path)| Some((number[object as usize]?, path)));
         motion.movers = kept.collect();
     }
+    if let Some(articulated) = &mut effects.articulated {
+        for figure in &mut articulated.figures {
+            let kept = figure.limbs.drain(..);
+            let kept = kept
+                .filter_map(|limb| Some(Limb { object: number[limb.object as usize]?, ..limb }));
+            figure.limbs = kept.collect();
+        }
+        articulated.figures.retain(|figure| !figure.limbs.is_empty());
+    }
     if let Some(teleport) = &mut effects.teleport {
         let kept = teleport.jumpers.drain(..);
         let kept = kept.filter_map(|(object, jumps)| Some((number[object as usize]?, jumps)));
         teleport.jumpers = kept.collect();
     }
     effects.motion = effects.motion.filter(|motion| !motion.movers.is_empty());
+    effects.articulated = effects.articulated.filter(|all| !all.figures.is_empty());
     effects.teleport = effects.teleport.filter(|teleport| !teleport.jumpers.is_empty());
     Scene { objects, meshes, effects, ..scene.clone() }
 }

@@ -241,6 +241,8 @@ fn outcome(
 /// What is in a scene, in a line.
 fn summary(scene: &Scene) -> String {
     let moving = scene.effects.motion.as_ref().map_or(0, |motion| motion.movers.len());
+    let figures = scene.effects.articulated.iter().flat_map(|all| &all.figures);
+    let moving = moving + figures.map(|figure| figure.limbs.len()).sum::<usize>();
     let jumping = scene.effects.teleport.as_ref().map_or(0, |teleport| teleport.jumpers.len());
     let lens = match scene.cameras[0].lens {
         Lens::Perspective { fov_y, .. } => format!("{:.0}°", fov_y.to_degrees()),

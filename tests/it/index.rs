@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use plainsight::cull::{CullerSetup, Item, ProxyKind, Scenery, SceneryKnobs};
-use plainsight::index::{Entry, INDEXES, Index, Moves, NodeId};
+use plainsight::index::{Entry, INDEXES, Index, Moves, NodeId, Work};
 use plainsight::math::{Aabb, Volume};
 use plainsight::oracle::CostModel;
 use plainsight::part::ObjectId;
@@ -78,7 +78,8 @@ impl Wanderers {
     }
 
     fn step(&mut self) {
-        (self.moved.clear(), self.jumped.clear());
+        self.moved.clear();
+        self.jumped.clear();
         for object in 0..self.boxes.len() {
             let id = ObjectId(object as u32);
             let (step, this) = (step_of(object), &mut self.boxes[object]);
@@ -86,7 +87,8 @@ impl Wanderers {
             if stream.below(40) == 0 {
                 let reach = if stream.below(4) == 0 { 60.0 } else { 20.0 };
                 *this = random_box(stream, reach);
-                (self.moved.push(id), self.jumped.push(id));
+                self.moved.push(id);
+                self.jumped.push(id);
             } else if step > 0.0 && stream.below(3) > 0 {
                 let mut any = |r: f64| stream.range(-r, r);
                 // On the whole away from the middle, so that many leave the space.
@@ -128,8 +130,9 @@ impl Wanderers {
 /// what is found is what a look at every box finds, or more.
 #[test]
 fn invariants_hold_after_every_step() {
+    let mut lines = String::new();
     for kind in INDEXES {
-        let (mut found_all, mut exact_all) = (0, 0);
+        let (mut found_all, mut exact_all, mut work) = (0, 0, Work::default());
         for (seed, count) in [(1, 0), (2, 1), (3, 2), (4, 50), (5, 300)] {
             let mut crowd = Wanderers::new(seed, count);
             let mut index = (kind.build)(&crowd.entries);
@@ -159,18 +162,31 @@ fn invariants_hold_after_every_step() {
                 crowd.step();
                 index.update(crowd.moves());
             }
+            work = work + index.work();
         }
         assert!(exact_all > 4000, "{}: {exact_all} in sight", kind.name);
-        println!("{}: found {found_all} of {exact_all}", kind.name);
+        let Work { ok, updates, steps, node_checks, object_checks, lowered } = work;
+        lines += &format!(
+            "{:<22} {found_all:>6} {ok:>6} {updates:>6} {steps:>7} {node_checks:>7} {object_checks:>6} {lowered:>6}\n",
+            kind.name
+        );
     }
+    let head = "index                   found     ok  moved    steps    nodes objects lowered\n";
+    insta::assert_snapshot!("index_work", format!("{head}{lines}"));
 }
 
 /// Bounds that a scene gives of its objects' steps and sides hold in every frame.
 #[test]
 fn bounds_on_steps_and_sides_hold() {
     let mut moves = 0;
-    for (name, scale) in [("city", 0.2), ("bunnies", 0.1), ("hard/teleports", 1.0), ("swarm", 1.0)]
-    {
+    for (name, scale) in [
+        ("city", 0.2),
+        ("bunnies", 0.1),
+        ("hard/teleports", 1.0),
+        ("swarm", 1.0),
+        ("city250k", 0.003),
+        ("spheres200k", 0.002),
+    ] {
         for seed in 1..4 {
             let world = world(name, seed, scale, 80);
             let entries = world.entries();

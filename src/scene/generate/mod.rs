@@ -2,6 +2,7 @@
 
 mod bunnies;
 mod city;
+mod city250k;
 mod hard;
 mod model;
 mod plant_parts;
@@ -9,6 +10,7 @@ mod powerplant;
 mod rooms;
 mod shape;
 mod soup;
+mod spheres200k;
 mod swarm;
 
 use std::path::PathBuf;
@@ -158,6 +160,18 @@ pub const GENERATORS: &[Generator] = &[
         name: "soup",
         summary: "random triangles and boxes of wild sizes, for property tests",
         build: soup::build,
+        ..USUAL
+    },
+    Generator {
+        name: "city250k",
+        summary: "a city of 250,000 objects, most of them limbs of pedestrians (Wortel 2011)",
+        build: city250k::build,
+        ..USUAL
+    },
+    Generator {
+        name: "spheres200k",
+        summary: "a cloud of 200,000 spheres, half of them moving (Wortel 2011)",
+        build: spheres200k::build,
         ..USUAL
     },
     Generator {

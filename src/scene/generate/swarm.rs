@@ -11,8 +11,8 @@ use glam::{DQuat, DVec3};
 use super::shape::{self, Builder};
 use super::{Chosen, Generator, USUAL};
 use crate::scene::{
-    CameraPath, CameraPose, Effects, Jumps, Lens, Mesh, Motion, Object, Path, Placement, Scene,
-    SceneError, Stream, Teleport, Travel, Viewport,
+    Articulated, CameraPath, CameraPose, Effects, Figure, Joint, Jumps, Lens, Limb, Mesh, Motion,
+    Object, Path, Placement, Scene, SceneError, Stream, Teleport, Travel, Viewport,
 };
 
 /// The generator; it stands in neither list of those that people look at.
@@ -240,10 +240,56 @@ fn effects(seed: u64, objects: &[Object], middle: DVec3, size: f64) -> Effects {
             jumpers.push((number, Jumps { offsets: offsets.collect(), period: 1 + jump.below(4) }));
         }
     }
+    let articulated = figures(seed, objects, middle, size, &movers);
     Effects {
+        articulated,
         motion: (!movers.is_empty()).then_some(Motion { movers }),
         teleport: (!jumpers.is_empty()).then_some(Teleport { jumpers }),
     }
+}
+
+/// Figures of two to five objects that do not move by themselves, in one world of five.
+fn figures(
+    seed: u64,
+    objects: &[Object],
+    middle: DVec3,
+    size: f64,
+    movers: &[(u32, Path)],
+) -> Option<Articulated> {
+    let mut stream = Stream::new(seed, "figures");
+    if stream.below(5) > 0 {
+        return None;
+    }
+    let moves = |id: &u32| movers.binary_search_by_key(id, |(object, _)| *object).is_ok();
+    let free: Vec<u32> = (0..objects.len() as u32).filter(|id| !moves(id)).collect();
+    let mut free = free.as_slice();
+    let mut figures = Vec::new();
+    while free.len() > 1 && figures.len() < 8 {
+        let (taken, rest) = free.split_at((2 + stream.below(4) as usize).min(free.len()));
+        free = rest;
+        let half =
+            [stream.range(0.2, 0.9), stream.range(0.2, 0.9)].map(|share| share * SPACE * size);
+        let path = Path::Lap {
+            center: middle + within(&mut stream, DVec3::ONE) * size,
+            half,
+            round: stream.range(0.01, 1.5) * half[0],
+            speed: stream.range(-0.5, 0.5) * size,
+            start: stream.unit() * SPACE * size,
+        };
+        let joint = |stream: &mut Stream| Joint {
+            hinge: within(stream, DVec3::ONE) * size,
+            swing: stream.pick(&[0.0, 0.3, 1.5]),
+            phase: stream.range(0.0, 6.0),
+        };
+        let limb = |(place, &object): (usize, &u32)| {
+            let joints = (0..1 + place % 3).map(|_| joint(&mut stream)).collect();
+            Limb { object, joints }
+        };
+        let limbs = taken.iter().enumerate().map(limb).collect();
+        let (pace, phase) = (stream.range(0.0, 1.0), stream.range(0.0, 6.0));
+        figures.push(Figure { path, start: middle, pace, phase, limbs });
+    }
+    (!figures.is_empty()).then_some(Articulated { figures })
 }
 
 fn cameras(chosen: &Chosen, middle: DVec3, size: f64) -> Vec<CameraPath> {
@@ -296,6 +342,7 @@ mod tests {
             assert!((10..=190).contains(&count), "{count} of 200");
         };
         both(&|scene| scene.effects.motion.is_some());
+        both(&|scene| scene.effects.articulated.is_some());
         both(&|scene| scene.effects.teleport.is_some());
         both(&|scene| scene.cameras.len() == 2);
         both(&|scene| scene.cameras[0].far.is_infinite());

@@ -166,6 +166,7 @@ impl Site {
             leaf_triangles: chosen.leaf_triangles,
             effects: Effects {
                 motion: (!movers.is_empty()).then_some(Motion { movers }),
+                articulated: None,
                 teleport: (!jumpers.is_empty()).then_some(Teleport { jumpers }),
             },
         }
