@@ -43,3 +43,4 @@ pub mod report;
 pub mod run;
 pub mod scene;
 pub mod stress;
+pub mod survey;

@@ -59,6 +59,11 @@ impl Rules for Bounds {
         *thing.bounds
     }
 
+    fn owes(&self, _: Aabb, _: Aabb) -> bool {
+        // It shrinks when it is looked at.
+        false
+    }
+
     fn merged(&self, a: Aabb, b: Aabb) -> Aabb {
         a.union(&b)
     }
@@ -90,6 +95,10 @@ impl Rules for Extents {
 
     fn extent(&self, thing: &Thing<'_>) -> DVec3 {
         thing.bounds.size() * 0.5
+    }
+
+    fn owes(&self, own: DVec3, whole: DVec3) -> bool {
+        own.cmpge(whole).any()
     }
 
     fn merged(&self, a: DVec3, b: DVec3) -> DVec3 {
@@ -124,6 +133,10 @@ impl Rules for Radius {
 
     fn extent(&self, thing: &Thing<'_>) -> f64 {
         thing.reach
+    }
+
+    fn owes(&self, own: f64, whole: f64) -> bool {
+        own >= whole
     }
 
     fn merged(&self, a: f64, b: f64) -> f64 {

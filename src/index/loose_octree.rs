@@ -67,6 +67,10 @@ impl Rules for Loose {
         if self.largest { thing.reach } else { 0.0 }
     }
 
+    fn owes(&self, own: f64, whole: f64) -> bool {
+        self.largest && own >= whole
+    }
+
     fn merged(&self, a: f64, b: f64) -> f64 {
         a.max(b)
     }

@@ -4,6 +4,7 @@
 
 mod bucket_octree;
 mod checklist;
+mod lazy_grid;
 mod list;
 mod loose_octree;
 mod octree;
@@ -19,6 +20,7 @@ use crate::math::{Aabb, Meets, Volume};
 use crate::part::ObjectId;
 
 pub use bucket_octree::{bounds_octree, extents_octree, radius_octree};
+pub use lazy_grid::{GridKnobs, LazyGrid};
 pub use list::List;
 pub use loose_octree::{LooseKnobs, loose_octree};
 pub use octree::{octree, overlapping_octree};
@@ -314,6 +316,11 @@ pub const INDEXES: &[IndexKind] = &[
             let knobs = usual(Split::Octants, entries).reduced(REDUCTION);
             loose_octree(entries, knobs, LooseKnobs::default())
         },
+    },
+    IndexKind {
+        name: "lazy-grid",
+        summary: "grids over one another, objects in large cells until somebody looks; this project's own",
+        build: |entries| Box::new(LazyGrid::new(entries, GridKnobs::default())),
     },
     IndexKind {
         name: "loose-quadtree-lazy",

@@ -39,6 +39,10 @@ impl Rules for Fit {
 
     fn extent(&self, _: &Thing<'_>) {}
 
+    fn owes(&self, (): (), (): ()) -> bool {
+        false
+    }
+
     fn merged(&self, (): (), (): ()) {}
 
     fn volume(&self, space: &Aabb, _: u8, (): &()) -> Aabb {

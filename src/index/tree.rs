@@ -17,9 +17,9 @@ use std::borrow::Cow;
 
 use glam::DVec3;
 
-use super::checklist::Checklists;
+use super::checklist::{Checklists, Due};
 use super::{Entry, Index, Moves, Node, NodeId, Work};
-use crate::math::{Aabb, Meets, Volume};
+use crate::math::{Aabb, Planes, Volume};
 use crate::part::ObjectId;
 
 /// Along which axes a node's space is halved.
@@ -121,6 +121,10 @@ pub(super) trait Rules {
     /// What an object adds to the extent of its node.
     fn extent(&self, thing: &Thing<'_>) -> Self::Extent;
 
+    /// Whether a node's extent may be what it is because of the first, of an object. Where it never is,
+    /// extents are all the same.
+    fn owes(&self, own: Self::Extent, whole: Self::Extent) -> bool;
+
     /// The extent of both.
     fn merged(&self, a: Self::Extent, b: Self::Extent) -> Self::Extent;
 
@@ -152,13 +156,23 @@ struct TreeNode<E> {
     loose: bool,
 }
 
-/// Where an object hangs.
+/// Where an object hangs, and all that is known of it: one piece of memory for each object looked at.
 #[derive(Clone, Copy, Debug)]
 struct Home {
     node: u32,
     /// Place among the node's objects.
     place: u32,
+    /// The largest half side that its box ever has.
+    reach: f32,
+    /// The farthest its middle moves in a frame.
+    step: f32,
+    due: Due,
 }
+
+/// Updates ahead that can be foreseen.
+const AHEAD: u32 = 256;
+/// Objects that are due whose memory is read ahead of the decisions, so that the reads overlap.
+const READ_AHEAD: usize = 32;
 
 /// A tree by some rules.
 #[derive(Clone, Debug)]
@@ -167,9 +181,6 @@ pub(super) struct Tree<R: Rules> {
     knobs: TreeKnobs,
     nodes: Vec<TreeNode<R::Extent>>,
     homes: Vec<Home>,
-    reach: Vec<f32>,
-    /// Bounds on steps, for the checklists.
-    steps: Vec<f32>,
     lists: Option<Checklists>,
     /// Objects that the root does not hold, ascending.
     strays: Vec<ObjectId>,
@@ -178,10 +189,31 @@ pub(super) struct Tree<R: Rules> {
     work: Work,
 }
 
+/// The space of a quadtree: its own height more above and below, and at least a sixteenth of its longer
+/// side. All nodes are as high, so nobody is to be looked at for walking on the ground.
+fn headroom(space: &Aabb) -> Aabb {
+    let size = space.size();
+    space.grown(DVec3::Y * size.y.max(size.max_element() / 16.0))
+}
+
+/// How far the middle of a box is from the nearest border of a space; negative outside, NaN for the empty
+/// box.
+fn inside(space: &Aabb, bounds: &Aabb) -> f64 {
+    let at = bounds.center();
+    (at - space.min).min(space.max - at).min_element()
+}
+
 /// The next f32 that is no less, so that bounds stay bounds.
 fn rounded_up(value: f64) -> f32 {
     let near = value as f32;
     if f64::from(near) < value { near.next_up() } else { near }
+}
+
+impl Home {
+    fn of(entry: &Entry) -> Self {
+        let [reach, step] = [entry.reach, entry.step_bound].map(rounded_up);
+        Self { node: NONE, place: 0, reach, step, due: Due::NEVER }
+    }
 }
 
 impl<R: Rules> Tree<R> {
@@ -189,22 +221,21 @@ impl<R: Rules> Tree<R> {
     pub(super) fn new(entries: &[Entry], knobs: TreeKnobs, rules: impl FnOnce(&Aabb) -> R) -> Self {
         let space = entries.iter().fold(Aabb::EMPTY, |all, entry| all.union(&entry.bounds));
         let space = if space.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ZERO) } else { space };
+        let space = match knobs.split {
+            Split::Octants => space,
+            Split::Quadrants => headroom(&space),
+        };
         let mut tree = Self {
             rules: rules(&space),
             knobs,
             nodes: Vec::new(),
-            homes: vec![Home { node: NONE, place: 0 }; entries.len()],
-            reach: entries.iter().map(|entry| rounded_up(entry.reach)).collect(),
-            steps: Vec::new(),
-            lists: knobs.checklists.then(|| Checklists::new(entries.len())),
+            homes: entries.iter().map(Home::of).collect(),
+            lists: knobs.checklists.then(|| Checklists::new(AHEAD)),
             strays: Vec::new(),
             free: Vec::new(),
             rebuilt: Vec::new(),
             work: Work::default(),
         };
-        if knobs.checklists {
-            tree.steps = entries.iter().map(|entry| rounded_up(entry.step_bound)).collect();
-        }
         tree.node_for(space, NONE, 0);
         let boxes: Vec<Aabb> = entries.iter().map(|entry| entry.bounds).collect();
         for id in (0..entries.len() as u32).map(ObjectId) {
@@ -224,7 +255,7 @@ impl<R: Rules> Tree<R> {
 
     fn thing<'a>(&self, boxes: &'a [Aabb], id: ObjectId) -> Thing<'a> {
         let bounds = &boxes[id.0 as usize];
-        let reach = f64::from(self.reach[id.0 as usize]);
+        let reach = f64::from(self.homes[id.0 as usize].reach);
         Thing { id, bounds, at: bounds.center(), reach }
     }
 
@@ -344,7 +375,8 @@ impl<R: Rules> Tree<R> {
     /// Hangs an object that hangs nowhere at `node`, and counts it up to but without `top`'s parent.
     fn link(&mut self, id: ObjectId, node: u32, top: u32, boxes: &[Aabb]) {
         let objects = &mut self.nodes[node as usize].objects;
-        self.homes[id.0 as usize] = Home { node, place: objects.len() as u32 };
+        let home = &mut self.homes[id.0 as usize];
+        (home.node, home.place) = (node, objects.len() as u32);
         objects.push(id);
         self.count(node, top, 1);
         self.grow(node, boxes, id);
@@ -364,7 +396,7 @@ impl<R: Rules> Tree<R> {
 
     /// Takes the object into the extents at and above its node.
     fn grow(&mut self, node: u32, boxes: &[Aabb], id: ObjectId) {
-        if size_of::<R::Extent>() == 0 || boxes[id.0 as usize].is_empty() {
+        if boxes[id.0 as usize].is_empty() {
             return;
         }
         let own = self.rules.extent(&self.thing(boxes, id));
@@ -393,13 +425,14 @@ impl<R: Rules> Tree<R> {
         own.chain(below).fold(R::NOTHING, |all, one| self.rules.merged(all, one))
     }
 
-    /// Shrinks extents from `node` upwards as far as they change.
-    fn shrink(&mut self, node: u32, boxes: &[Aabb]) {
+    /// Shrinks extents from `node` upwards as far as they change, now that `own` has gone.
+    fn shrink(&mut self, node: u32, own: R::Extent, boxes: &[Aabb]) {
         let mut at = node;
-        while at != NONE {
+        while at != NONE && self.rules.owes(own, self.nodes[at as usize].extent) {
             let needed = self.needed(at, boxes);
             let this = &mut self.nodes[at as usize];
-            if needed == this.extent {
+            // Who has grown and is not looked at yet will be.
+            if needed == this.extent || self.rules.merged(needed, this.extent) != this.extent {
                 break;
             }
             this.extent = needed;
@@ -423,7 +456,7 @@ impl<R: Rules> Tree<R> {
 
     /// Hangs an object elsewhere, and takes out what is empty then.
     fn relink(&mut self, id: ObjectId, to: u32, boxes: &[Aabb]) {
-        let Home { node: from, place } = self.homes[id.0 as usize];
+        let Home { node: from, place, .. } = self.homes[id.0 as usize];
         let common = self.common(from, to);
         self.count(common, common, -1);
         self.link(id, to, common, boxes);
@@ -449,8 +482,9 @@ impl<R: Rules> Tree<R> {
                 self.nodes[at as usize].loose = true;
                 at = self.nodes[at as usize].parent;
             }
-        } else if size_of::<R::Extent>() > 0 {
-            self.shrink(at, boxes);
+        } else if !boxes[id.0 as usize].is_empty() {
+            let own = self.rules.extent(&self.thing(boxes, id));
+            self.shrink(at, own, boxes);
         }
     }
 
@@ -503,6 +537,32 @@ impl<R: Rules> Tree<R> {
         self.schedule(id, boxes);
     }
 
+    /// Looks at objects whose turn it is, at most [`READ_AHEAD`]. Most are where they belong.
+    fn look_at_due(&mut self, ids: &[ObjectId], boxes: &[Aabb]) {
+        let Some(lists) = &mut self.lists else { return };
+        let mut distances = [0.0; READ_AHEAD];
+        for (distance, &id) in distances.iter_mut().zip(ids) {
+            let space = &self.nodes[self.homes[id.0 as usize].node as usize].space;
+            *distance = inside(space, &boxes[id.0 as usize]);
+        }
+        let mut left = [false; READ_AHEAD];
+        for ((&id, distance), left) in ids.iter().zip(distances).zip(&mut left) {
+            let home = &mut self.homes[id.0 as usize];
+            if !lists.is_due(home.due) {
+                continue;
+            }
+            if distance >= 0.0 && home.node != 0 {
+                self.work.ok += 1;
+                lists.put(id, &mut home.due, distance, f64::from(home.step));
+            } else {
+                *left = true;
+            }
+        }
+        for (&id, _) in ids.iter().zip(left).filter(|(_, left)| *left) {
+            self.look_at(id, boxes);
+        }
+    }
+
     /// Keeps the list of what the root does not hold.
     fn note_stray(&mut self, id: ObjectId, boxes: &[Aabb]) {
         let place = self.strays.binary_search(&id);
@@ -525,11 +585,10 @@ impl<R: Rules> Tree<R> {
     /// Sets when the object is to be looked at again.
     fn schedule(&mut self, id: ObjectId, boxes: &[Aabb]) {
         let Some(lists) = &mut self.lists else { return };
-        let Aabb { min, max } = self.nodes[self.homes[id.0 as usize].node as usize].space;
-        let at = boxes[id.0 as usize].center();
-        let distance = (at - min).min(max - at).min_element();
+        let home = &mut self.homes[id.0 as usize];
+        let distance = inside(&self.nodes[home.node as usize].space, &boxes[id.0 as usize]);
         let distance = if distance >= 0.0 { distance } else { 0.0 };
-        lists.put(id, distance, f64::from(self.steps[id.0 as usize]));
+        lists.put(id, &mut home.due, distance, f64::from(home.step));
     }
 
     /// What the objects at a node that belong below it wait for: a level down.
@@ -551,7 +610,7 @@ impl<R: Rules> Tree<R> {
             self.relink(id, child, boxes);
             self.work.lowered += 1;
             if let Some(lists) = &mut self.lists {
-                lists.put_next(id);
+                lists.put_next(id, &mut self.homes[id.0 as usize].due);
             }
         }
     }
@@ -565,8 +624,9 @@ impl<R: Rules> Tree<R> {
 
     /// Goes through what meets the volume, and moves down what belongs lower; tells `found` of objects.
     fn walk(&mut self, boxes: &[Aabb], volume: &Volume, found: &mut dyn FnMut(&[ObjectId])) {
-        let mut stack = vec![(0, false)];
-        while let Some((node, inside)) = stack.pop() {
+        let mut stack = vec![(0, Planes::ALL)];
+        while let Some((node, planes)) = stack.pop() {
+            let inside = planes.is_empty();
             self.work.node_checks += 1;
             if R::LAZY_EXTENT && !inside && self.nodes[node as usize].loose {
                 let needed = self.needed(node, boxes);
@@ -578,23 +638,21 @@ impl<R: Rules> Tree<R> {
             }
             let this = &self.nodes[node as usize];
             let alone = self.knobs.leaf_boxes && this.objects.len() == 1 && self.is_leaf(node);
-            let meets = if inside {
-                Meets::Inside
+            let straddled = if inside {
+                Some(planes)
             } else if alone {
-                volume.meets(&boxes[this.objects[0].0 as usize])
+                volume.straddled(&boxes[this.objects[0].0 as usize], planes)
             } else {
-                self.volume_of(node).map_or(Meets::Partly, |aabb| volume.meets(&aabb))
+                self.volume_of(node).map_or(Some(planes), |aabb| volume.straddled(&aabb, planes))
             };
-            if meets == Meets::Outside {
-                continue;
-            }
-            if meets == Meets::Partly && !alone && self.knobs.depth_reduction > 0 {
+            let Some(planes) = straddled else { continue };
+            if !planes.is_empty() && !alone && self.knobs.depth_reduction > 0 {
                 self.lower(node, boxes);
             }
             let this = &self.nodes[node as usize];
             found(&this.objects);
             let children = this.children.iter().filter(|&&child| child != NONE);
-            stack.extend(children.map(|&child| (child, meets == Meets::Inside)));
+            stack.extend(children.map(|&child| (child, planes)));
         }
     }
 
@@ -682,11 +740,8 @@ impl<R: Rules + Send> Index for Tree<R> {
         };
         let due = lists.next();
         moves.jumped.iter().for_each(|&id| self.look_at(id, moves.boxes));
-        for &id in &due {
-            // Who jumped was looked at.
-            if self.lists.as_ref().is_some_and(|lists| lists.ahead(id) == Some(0)) {
-                self.look_at(id, moves.boxes);
-            }
+        for ids in due.chunks(READ_AHEAD) {
+            self.look_at_due(ids, moves.boxes);
         }
         if let Some(lists) = &mut self.lists {
             lists.recycle(due);
@@ -712,7 +767,6 @@ impl<R: Rules + Send> Index for Tree<R> {
         self.nodes.capacity() * size_of::<TreeNode<R::Extent>>()
             + objects * size_of::<ObjectId>()
             + self.homes.capacity() * size_of::<Home>()
-            + (self.reach.capacity() + self.steps.capacity()) * size_of::<f32>()
             + (self.strays.capacity() + self.free.capacity() + self.rebuilt.capacity()) * 4
             + self.lists.as_ref().map_or(0, Checklists::heap_bytes)
     }

@@ -21,4 +21,4 @@ pub use hull::{
 pub use inflate::{BOX_DEPTH_SLACK, BOX_DILATION_PIXELS, inflated_box, inflated_box_with};
 pub use margins::Margins;
 pub use trig::{cos, sin, tan};
-pub use volume::{Meets, Volume};
+pub use volume::{Meets, Planes, Volume};

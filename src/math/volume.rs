@@ -25,15 +25,42 @@ pub enum Meets {
     Inside,
 }
 
+/// Planes of a volume that are still to be asked about: those that a box around is not wholly inside of
+/// (plane masks: Assarsson & Möller 2000, *Optimized view frustum culling algorithms for bounding boxes*).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Planes(u8);
+
+impl Planes {
+    /// All six.
+    pub const ALL: Self = Self((1 << PLANES) - 1);
+
+    /// Whether there are none: a box inside is inside the volume.
+    #[must_use]
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+/// One half-space, its normal parted by sign: of a box, one of the two parts meets the higher coordinate.
+#[derive(Clone, Copy, Debug)]
+struct HalfSpace {
+    positive: DVec3,
+    negative: DVec3,
+    offset: f64,
+}
+
+impl HalfSpace {
+    /// For the corner that takes `high` where the normal is positive.
+    fn sum(&self, high: DVec3, low: DVec3) -> f64 {
+        let terms = self.positive * high + self.negative * low;
+        terms.x + terms.y + terms.z + self.offset
+    }
+}
+
 /// Six half-spaces. A point p is inside where `normal · p + offset ≥ 0` for all.
 #[derive(Clone, Copy, Debug)]
 pub struct Volume {
-    /// By plane: what is positive of the normal's x, y, z, then what is negative, then the offset.
-    positive: [[f64; PLANES]; 3],
-    negative: [[f64; PLANES]; 3],
-    offset: [f64; PLANES],
-    /// Holds the volume.
-    bounds: Aabb,
+    half_spaces: [HalfSpace; PLANES],
 }
 
 impl Volume {
@@ -47,78 +74,73 @@ impl Volume {
             DepthOrder::Reversed => [z + w, -z],
         };
         let planes = [w + x, w - x, w + y, w - y, near, far];
-        let part =
-            |axis: usize, keep: &dyn Fn(f64) -> f64| planes.map(|plane: DVec4| keep(plane[axis]));
-        let split = |keep: &dyn Fn(f64) -> f64| [0, 1, 2].map(|axis| part(axis, keep));
-        Self {
-            positive: split(&|n| n.max(0.0)),
-            negative: split(&|n| n.min(0.0)),
-            offset: planes.map(|plane| plane.w),
-            bounds: Self::bounds_of(&clip_from_world.inverse(), order),
-        }
-    }
-
-    /// The box of the corners, or all space where they are not finite. A hint where to look, widened by
-    /// its own size times 2⁻²⁰: inverting the matrix costs digits, and nothing is decided by it alone
-    /// that the planes would not decide a hundredth of a unit away.
-    fn bounds_of(world_from_clip: &DMat4, order: DepthOrder) -> Aabb {
-        let depths = match order {
-            DepthOrder::Forward => [0.0, 1.0],
-            DepthOrder::Reversed => [-1.0, 0.0],
+        let half_space = |plane: DVec4| {
+            let normal = plane.truncate();
+            let (positive, negative) = (normal.max(DVec3::ZERO), normal.min(DVec3::ZERO));
+            HalfSpace { positive, negative, offset: plane.w }
         };
-        let mut bounds = Aabb::EMPTY;
-        for corner in 0..8_u8 {
-            let sign = |bit: u8| if corner >> bit & 1 == 0 { -1.0 } else { 1.0 };
-            let at = DVec4::new(sign(0), sign(1), depths[usize::from(corner >> 2 & 1)], 1.0);
-            let point = *world_from_clip * at;
-            let point = point.truncate() / point.w;
-            if !point.is_finite() || point.abs().max_element() > 1e15 {
-                return Aabb::new(DVec3::splat(f64::NEG_INFINITY), DVec3::splat(f64::INFINITY));
-            }
-            bounds = bounds.union(&Aabb::new(point, point));
-        }
-        bounds.grown(DVec3::splat(bounds.size().max_element() / (1_u64 << 20) as f64))
-    }
-
-    /// A box that holds the volume.
-    #[must_use]
-    pub fn bounds(&self) -> &Aabb {
-        &self.bounds
+        Self { half_spaces: planes.map(half_space) }
     }
 
     /// What a box has of it. The empty box is outside; one with a side that is not a number meets it
     /// partly.
     #[must_use]
     pub fn meets(&self, aabb: &Aabb) -> Meets {
-        if aabb.is_empty() && !(aabb.min.is_nan() || aabb.max.is_nan()) {
-            return Meets::Outside;
+        match self.straddled(aabb, Planes::ALL) {
+            None => Meets::Outside,
+            Some(planes) if planes.is_empty() => Meets::Inside,
+            Some(_) => Meets::Partly,
         }
-        let (farthest, nearest) = (self.sums(aabb.max, aabb.min), self.sums(aabb.min, aabb.max));
-        if farthest.iter().any(|&sum| sum < 0.0) {
-            Meets::Outside
-        } else if nearest.iter().all(|&sum| sum >= 0.0) {
-            Meets::Inside
-        } else {
-            Meets::Partly
+    }
+
+    /// Of some planes, those that a box is not wholly inside of; `None` where it is beyond one of them.
+    #[must_use]
+    pub fn straddled(&self, aabb: &Aabb, planes: Planes) -> Option<Planes> {
+        if is_empty(aabb) {
+            return None;
         }
+        let (mut left, mut straddled) = (planes.0, 0);
+        while left != 0 {
+            let plane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let half_space = &self.half_spaces[plane];
+            if half_space.sum(aabb.max, aabb.min) < 0.0 {
+                return None;
+            }
+            // A sum that is not a number decides nothing.
+            let inside = half_space.sum(aabb.min, aabb.max) >= 0.0;
+            straddled |= u8::from(!inside) << plane;
+        }
+        Some(Planes(straddled))
     }
 
     /// Whether a box is not wholly beyond one of the planes.
     #[must_use]
     pub fn touches(&self, aabb: &Aabb) -> bool {
-        self.meets(aabb) != Meets::Outside
+        self.touches_planes(aabb, Planes::ALL)
     }
 
-    /// By plane, the sum for the corner that takes `high` where the normal is positive.
-    fn sums(&self, high: DVec3, low: DVec3) -> [f64; PLANES] {
-        let ([px, py, pz], [nx, ny, nz]) = (&self.positive, &self.negative);
-        std::array::from_fn(|i| {
-            let x = px[i] * high.x + nx[i] * low.x;
-            let y = py[i] * high.y + ny[i] * low.y;
-            let z = pz[i] * high.z + nz[i] * low.z;
-            x + y + z + self.offset[i]
-        })
+    /// The same of some planes.
+    #[must_use]
+    pub fn touches_planes(&self, aabb: &Aabb, planes: Planes) -> bool {
+        if is_empty(aabb) {
+            return false;
+        }
+        let mut left = planes.0;
+        while left != 0 {
+            let plane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            if self.half_spaces[plane].sum(aabb.max, aabb.min) < 0.0 {
+                return false;
+            }
+        }
+        true
     }
+}
+
+/// Whether a box certainly holds nothing; what is not a number says nothing.
+fn is_empty(aabb: &Aabb) -> bool {
+    aabb.min.cmpgt(aabb.max).any()
 }
 
 #[cfg(test)]
@@ -158,8 +180,6 @@ mod tests {
             assert_eq!(volume.meets(&nan), Meets::Partly);
             let all = cube([0.0; 3], f64::INFINITY);
             assert_eq!(volume.meets(&all), Meets::Partly, "all space");
-            let bounds = volume.bounds();
-            assert!(bounds.contains(&cube([0.0, 0.0, -6.0], 1.0)) && bounds.size().z < 10.1);
         }
     }
 
@@ -185,6 +205,13 @@ mod tests {
             }
             if volume.meets(&inner) != Meets::Outside {
                 prop_assert_ne!(volume.meets(&outer), Meets::Outside);
+            }
+            prop_assert_eq!(volume.touches(&inner), volume.meets(&inner) != Meets::Outside);
+            // To ask about what the outer one straddles is to ask about all.
+            if let Some(planes) = volume.straddled(&outer, Planes::ALL) {
+                let all = volume.straddled(&inner, Planes::ALL);
+                prop_assert_eq!(volume.straddled(&inner, planes), all);
+                prop_assert_eq!(volume.touches_planes(&inner, planes), volume.touches(&inner));
             }
         }
     }

@@ -144,6 +144,27 @@ impl World {
         self.effects.moving().len()
     }
 
+    /// Ids of the objects that some effect moves, ascending.
+    pub(super) fn moving(&self) -> &[u32] {
+        self.effects.moving()
+    }
+
+    /// World boxes of all objects where nothing moves them, by id.
+    pub(super) fn boxes_at_rest(&self) -> impl Iterator<Item = Aabb> {
+        self.rest.iter().map(|rest| rest.bounds)
+    }
+
+    /// The world box of an object at that tick of its effects.
+    pub(super) fn bounds_of(&self, id: ObjectId, tick: u32, work: &mut effect::Work) -> Aabb {
+        let placed = self.effects.placement(id.0, tick, work).world_from_object();
+        self.partition.mesh(id).bounds.transformed(&placed)
+    }
+
+    /// Whether an object may have gone farther to that tick than its step bound.
+    pub(super) fn jumps(&self, id: ObjectId, tick: u32) -> bool {
+        self.effects.jumped(id.0, tick)
+    }
+
     /// Where an object stands at frame `t`: the affine matrix from its space to the world.
     ///
     /// # Panics
@@ -172,8 +193,11 @@ impl World {
     /// What an index is built from: the boxes of frame 0.
     #[must_use]
     pub fn entries(&self) -> Vec<Entry> {
-        let state = FrameState::first(self);
-        (0..).zip(state.boxes).map(|(object, bounds)| self.entry(object, bounds)).collect()
+        let first = super::Boxes::first(self);
+        (0..)
+            .zip(first.moves().boxes.iter().copied())
+            .map(|(object, bounds)| self.entry(object, bounds))
+            .collect()
     }
 
     fn entry(&self, object: u32, bounds: Aabb) -> Entry {

@@ -3,6 +3,7 @@
 //! It must not know the checks: an observer is anything that implements [`Observer`].
 
 mod account;
+mod boxes;
 mod calibrate;
 mod frame;
 mod lane;
@@ -12,6 +13,7 @@ mod trace;
 mod truth;
 
 pub use account::{Account, Made, PartTruth, Step, account};
+pub use boxes::Boxes;
 pub use calibrate::{Bench, CalibrationKnobs, Workload, frames_to_measure, measure, workloads};
 pub use frame::{FrameState, FrameWork, World};
 pub use lane::{Lane, LaneInfo, Observer, Repeat, RunError, run};

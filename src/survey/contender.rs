@@ -1,0 +1,163 @@
+//! Who is compared: the trees of Wortel 2011 by their names there, with the knobs of each on each of the two
+//! scenes, and what stands beside them. Knobs are tuned by the thesis's rule (section 5.1): what is found is
+//! to be about 1.1 times what there is; `plainsight tune` finds them again.
+
+use crate::index::{
+    Entry, GridKnobs, Index, LazyGrid, List, LooseKnobs, Split, TreeKnobs, TwoLevelBsp,
+    bounds_octree, extents_octree, loose_octree, octree, overlapping_octree, radius_octree,
+};
+
+/// A tree of the thesis, or something beside it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Objects at the smallest node that holds them.
+    One,
+    /// The same with larger nodes.
+    Two,
+    /// Buckets, nodes as large as their contents.
+    Three,
+    /// Buckets, nodes larger by their largest object's sides.
+    ThreeB,
+    /// Buckets, nodes larger by their largest object's radius.
+    ThreeBR,
+    /// Middles say where, sizes how deep.
+    Four,
+    /// The two-level BSP's scene tree.
+    Bsp,
+    /// Grids over one another, this project's own.
+    LazyGrid,
+    /// A look at every box.
+    List,
+}
+
+/// A method with knobs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contender {
+    /// Its name in the thesis, or its own.
+    pub name: &'static str,
+    /// What it is.
+    pub method: Method,
+    /// Its knobs; those it does not have are ignored.
+    pub knobs: TreeKnobs,
+}
+
+impl Contender {
+    /// Builds the index over the objects of frame 0.
+    #[must_use]
+    pub fn build(&self, entries: &[Entry]) -> Box<dyn Index> {
+        let knobs = self.knobs;
+        match self.method {
+            Method::One => octree(entries, knobs),
+            Method::Two => overlapping_octree(entries, knobs),
+            Method::Three => bounds_octree(entries, knobs),
+            Method::ThreeB => extents_octree(entries, knobs),
+            Method::ThreeBR => radius_octree(entries, knobs),
+            Method::Four => loose_octree(entries, knobs, LooseKnobs::default()),
+            Method::Bsp => Box::new(TwoLevelBsp::new(entries)),
+            Method::LazyGrid => Box::new(LazyGrid::new(entries, GridKnobs::default())),
+            Method::List => Box::new(List::new(entries)),
+        }
+    }
+
+    /// The knobs that it has, in words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let TreeKnobs { max_depth, size_divisor, capacity, start_depth, depth_reduction, .. } =
+            self.knobs;
+        let mut words = match self.method {
+            Method::One => format!("depth {max_depth}"),
+            Method::Two | Method::Four => format!("depth {max_depth}, divisor {size_divisor}"),
+            Method::Three | Method::ThreeB | Method::ThreeBR => {
+                format!("{capacity} a node, start {start_depth}")
+            }
+            Method::Bsp | Method::LazyGrid | Method::List => String::new(),
+        };
+        if depth_reduction > 0 {
+            words += &format!(", reduced by {depth_reduction}");
+        }
+        if self.knobs.checklists {
+            words += ", checklists";
+        }
+        words
+    }
+}
+
+/// A scene of the thesis, and how it splits space there.
+#[derive(Clone, Copy, Debug)]
+pub struct Tuned {
+    /// Its name.
+    pub scene: &'static str,
+    /// Octrees for the cloud, quadtrees for the flat city.
+    pub split: Split,
+    /// Whether the knobs are the thesis's own, or tuned on the scenes of this bench.
+    contenders: fn(bool) -> Vec<Contender>,
+}
+
+/// The scenes of the thesis.
+pub const SCENES: &[Tuned] = &[
+    Tuned { scene: "city250k", split: Split::Quadrants, contenders: city },
+    Tuned { scene: "spheres200k", split: Split::Octants, contenders: spheres },
+];
+
+/// The contenders on a scene of [`SCENES`], with the knobs that the thesis gives or with those tuned here.
+#[must_use]
+pub fn contenders(scene: &Tuned, thesis: bool) -> Vec<Contender> {
+    (scene.contenders)(thesis)
+}
+
+fn with(split: Split, max_depth: u8) -> TreeKnobs {
+    TreeKnobs { max_depth, ..TreeKnobs::usual(split, 0) }
+}
+
+fn bucket(split: Split, capacity: u32, start_depth: u8) -> TreeKnobs {
+    TreeKnobs { capacity, start_depth, ..with(split, TreeKnobs::DEEPEST) }
+}
+
+fn divided(split: Split, max_depth: u8, size_divisor: f64) -> TreeKnobs {
+    TreeKnobs { size_divisor, ..with(split, max_depth) }
+}
+
+fn beside(split: Split) -> [Contender; 3] {
+    let knobs = TreeKnobs::usual(split, 0);
+    [
+        Contender { name: "two-level BSP", method: Method::Bsp, knobs },
+        Contender { name: "lazy grid", method: Method::LazyGrid, knobs },
+        Contender { name: "list", method: Method::List, knobs },
+    ]
+}
+
+/// Wortel 2011, section 5.2.1, the list for Figure 5.8.
+fn city(thesis: bool) -> Vec<Contender> {
+    let split = Split::Quadrants;
+    let of = |name, method, knobs| Contender { name, method, knobs };
+    let _ = thesis;
+    let mut all = vec![
+        of("1", Method::One, with(split, 10)),
+        of("2", Method::Two, divided(split, 9, 2.0)),
+        of("3bR", Method::ThreeBR, bucket(split, 168, 9)),
+        of("3bR DR/OCL", Method::ThreeBR, bucket(split, 168, 9).reduced(3)),
+        of("4", Method::Four, divided(split, 10, 2.0)),
+        of("4 DR/OCL", Method::Four, divided(split, 10, 2.0).reduced(4)),
+    ];
+    all.extend(beside(split));
+    all
+}
+
+/// The same for Figure 5.6.
+fn spheres(thesis: bool) -> Vec<Contender> {
+    let split = Split::Octants;
+    let of = |name, method, knobs| Contender { name, method, knobs };
+    let _ = thesis;
+    let mut all = vec![
+        of("1", Method::One, with(split, 8)),
+        of("2", Method::Two, divided(split, 7, 3.0)),
+        of("3", Method::Three, bucket(split, 2, 5)),
+        of("3b", Method::ThreeB, bucket(split, 2, 7)),
+        of("3bR", Method::ThreeBR, bucket(split, 8, 7)),
+        of("3bR DR/OCL", Method::ThreeBR, bucket(split, 8, 7).reduced(3)),
+        of("4", Method::Four, divided(split, 6, 6.0)),
+        of("4 DR/OCL", Method::Four, divided(split, 6, 6.0).reduced(3)),
+    ];
+    all.extend(beside(split));
+    all
+}
