@@ -11,6 +11,7 @@ use super::faults::FaultsArgs;
 use super::judge::JudgeArgs;
 use super::report::ReportArgs;
 use super::stress::StressArgs;
+use super::thesis::TuneArgs;
 use super::why::WhyArgs;
 use crate::cull::ProxyKind;
 use crate::oracle::{Latency, MIB, MemoryKnobs, Misbehaviour, Schedule};
@@ -41,7 +42,8 @@ pub(super) enum Verb {
     Replay(ReplayArgs),
     /// Draw a frame: the truth, the culled image and the view from above, as PNG.
     Picture(PictureArgs),
-    /// Set cullers beside Table 1 and Figures 6 to 9 of Kovalčík & Sochor 2006, on the same frames.
+    /// Set cullers beside Table 1 and Figures 6 to 9 of Kovalčík & Sochor 2006, on the same frames; with
+    /// --thesis, indexes beside the figures of Wortel 2011.
     Compare(CompareArgs),
     /// Measure what work costs a device and write the file that `--cost` reads.
     Calibrate(CalibrateArgs),
@@ -59,6 +61,8 @@ pub(super) enum Verb {
     Accuracy(AccuracyArgs),
     /// One HTML page of what runs came to, with charts, and pictures of every frame to scrub through.
     Report(ReportArgs),
+    /// Search for the knobs of the trees of Wortel 2011 by its rule: found is about 1.1 times actual.
+    Tune(TuneArgs),
     /// List scenes, cullers, oracles, indexes and devices.
     List,
 }
@@ -210,6 +214,13 @@ pub(super) struct CompareArgs {
     /// Folder for the figures (SVG and PNG) and the series (CSV).
     #[arg(long, value_name = "FOLDER", default_value = "comparison")]
     pub(super) out: PathBuf,
+    /// The trees of Wortel 2011 instead, on its scenes city250k and spheres200k: what updating and finding
+    /// cost, beside its Table 5.1 and Figures 5.1 to 5.9.
+    #[arg(long, conflicts_with_all = ["culler", "oracle", "leaves"])]
+    pub(super) thesis: bool,
+    /// With --thesis: the knobs that the thesis gives for its scenes, not those tuned for these.
+    #[arg(long, requires = "thesis")]
+    pub(super) thesis_knobs: bool,
 }
 
 #[derive(Args, Clone)]

@@ -16,6 +16,7 @@ mod replay;
 mod report;
 mod run;
 mod stress;
+mod thesis;
 mod why;
 
 use std::ffi::OsString;
@@ -107,6 +108,7 @@ pub fn main(
         args::Verb::Run(args) => run::run(&args, cullers, &mut streams),
         args::Verb::Replay(args) => replay::replay(&args, cullers, &mut streams),
         args::Verb::Picture(args) => picture::picture(&args, cullers, &mut streams),
+        args::Verb::Compare(args) if args.thesis => thesis::compare(&args, &mut streams),
         args::Verb::Compare(args) => compare::compare(&args, cullers, &mut streams),
         args::Verb::Calibrate(args) => calibrate::calibrate(&args, &mut streams),
         args::Verb::Export(args) => export::export(&args, &mut streams),
@@ -116,6 +118,7 @@ pub fn main(
         args::Verb::Stress(args) => stress::stress(&args, cullers, &mut streams),
         args::Verb::Accuracy(args) => accuracy::accuracy(&args, &mut streams),
         args::Verb::Report(args) => report::report(&args, cullers, &mut streams),
+        args::Verb::Tune(args) => thesis::tune_verb(&args, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),
     };
     done.unwrap_or_else(|error| {

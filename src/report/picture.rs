@@ -6,9 +6,11 @@ use image::{ImageEncoder, RgbImage};
 use plainsight_reference::Image;
 use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, Rect, Stroke, Transform};
 
+use crate::math::Aabb;
 use crate::part::{ObjectId, PartId};
 use crate::run::{FrameState, Truth, World};
-use crate::scene::Lens;
+use crate::scene::{Camera, Lens, Viewport};
+use crate::survey::Look;
 
 /// Pixels from the edge of the top view to what it shows.
 const MARGIN: f32 = 16.0;
@@ -114,7 +116,43 @@ pub fn top_view(world: &World, state: &FrameState, shown: &Shown<'_>, side: u32)
         let path = PathBuilder::from_rect(rect);
         pixmap.stroke_path(&path, &paint, &Stroke::default(), Transform::identity(), None);
     }
-    frustum(&mut pixmap, world, state, reach, &place);
+    frustum(&mut pixmap, (&state.camera, world.scene.viewport), reach * 1.5, &place);
+    let rgb = pixmap.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
+    RgbImage::from_raw(pixmap.width(), pixmap.height(), rgb).expect("three bytes a pixel")
+}
+
+/// A crowd from above (x to the right, z down), as Figures 5.3 to 5.5 of Wortel 2011: what was found, black
+/// where it meets the view volume and amber where it does not, above grey for the rest; the camera and its
+/// frustum as far as it sees.
+#[must_use]
+pub fn found_view(look: &Look, viewport: Viewport, side: u32) -> RgbImage {
+    let mut pixmap = Pixmap::new(side.max(64), side.max(64)).expect("a picture has pixels");
+    pixmap.fill(Color::WHITE);
+    let full = look.boxes.iter().filter(|aabb| !aabb.is_empty());
+    let space = full.fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+    let reach = space.size().x.max(space.size().z).max(1e-9);
+    let scale = f64::from(side.max(64) as f32 - 2.0 * MARGIN) / reach;
+    let place = |p: DVec3| {
+        let at = (p - space.min) * scale;
+        (at.x as f32 + MARGIN, at.z as f32 + MARGIN)
+    };
+    let mut dots = |ids: &mut dyn Iterator<Item = ObjectId>, [r, g, b]: [u8; 3]| {
+        let mut paint = Paint { anti_alias: false, ..Paint::default() };
+        paint.set_color_rgba8(r, g, b, 255);
+        for id in ids {
+            let (x, y) = place(look.boxes[id.0 as usize].center());
+            if let Some(dot) = Rect::from_xywh(x, y, 1.5, 1.5) {
+                pixmap.fill_rect(dot, &paint, Transform::identity(), None);
+            }
+        }
+    };
+    let all = 0..look.boxes.len() as u32;
+    let known = |id: &ObjectId| !look.boxes[id.0 as usize].is_empty();
+    dots(&mut all.map(ObjectId).filter(known), [225; 3]);
+    let meets = |id: &ObjectId| look.actual.binary_search(id).is_ok();
+    dots(&mut look.found.iter().copied().filter(|id| known(id) && !meets(id)), FATES[1]);
+    dots(&mut look.found.iter().copied().filter(|id| known(id) && meets(id)), [20; 3]);
+    frustum(&mut pixmap, (&look.camera, viewport), look.camera.far.min(reach * 1.5), &place);
     let rgb = pixmap.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
     RgbImage::from_raw(pixmap.width(), pixmap.height(), rgb).expect("three bytes a pixel")
 }
@@ -136,13 +174,10 @@ fn fate(world: &World, shown: &Shown<'_>, object: u32) -> usize {
 
 fn frustum(
     pixmap: &mut Pixmap,
-    world: &World,
-    state: &FrameState,
-    reach: f64,
+    (camera, viewport): (&Camera, Viewport),
+    far: f64,
     place: &dyn Fn(DVec3) -> (f32, f32),
 ) {
-    let camera = state.camera;
-    let viewport = world.scene.viewport;
     let aspect = f64::from(viewport.width) / f64::from(viewport.height);
     // The middle of a shifted frustum leans away from the view direction.
     let lean = match camera.lens {
@@ -154,7 +189,6 @@ fn frustum(
         let half = camera.lens.height_at(distance) * 0.5 * aspect;
         camera.eye + camera.forward * distance + right * ((side + lean) * half)
     };
-    let far = reach * 1.5;
     let mut path = PathBuilder::new();
     let (ex, ey) = place(camera.eye);
     for side in [-1.0, 1.0] {

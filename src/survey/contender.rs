@@ -130,14 +130,15 @@ fn beside(split: Split) -> [Contender; 3] {
 fn city(thesis: bool) -> Vec<Contender> {
     let split = Split::Quadrants;
     let of = |name, method, knobs| Contender { name, method, knobs };
-    let _ = thesis;
+    let pick = |published: TreeKnobs, tuned: TreeKnobs| if thesis { published } else { tuned };
+    let four = divided(split, 10, if thesis { 2.0 } else { 4.0 });
     let mut all = vec![
-        of("1", Method::One, with(split, 10)),
-        of("2", Method::Two, divided(split, 9, 2.0)),
-        of("3bR", Method::ThreeBR, bucket(split, 168, 9)),
-        of("3bR DR/OCL", Method::ThreeBR, bucket(split, 168, 9).reduced(3)),
-        of("4", Method::Four, divided(split, 10, 2.0)),
-        of("4 DR/OCL", Method::Four, divided(split, 10, 2.0).reduced(4)),
+        of("1", Method::One, pick(with(split, 10), with(split, 9))),
+        of("2", Method::Two, pick(divided(split, 9, 2.0), divided(split, 9, 3.0))),
+        of("3bR", Method::ThreeBR, pick(bucket(split, 168, 9), bucket(split, 8, 8))),
+        of("3bR DR/OCL", Method::ThreeBR, bucket(split, 168, 9).reduced(pick_depth(thesis, 3, 6))),
+        of("4", Method::Four, four),
+        of("4 DR/OCL", Method::Four, four.reduced(pick_depth(thesis, 4, 6))),
     ];
     all.extend(beside(split));
     all
@@ -147,17 +148,24 @@ fn city(thesis: bool) -> Vec<Contender> {
 fn spheres(thesis: bool) -> Vec<Contender> {
     let split = Split::Octants;
     let of = |name, method, knobs| Contender { name, method, knobs };
-    let _ = thesis;
+    let pick = |published: TreeKnobs, tuned: TreeKnobs| if thesis { published } else { tuned };
+    let radius = pick(bucket(split, 8, 7), bucket(split, 4, 7));
+    let four = pick(divided(split, 6, 6.0), divided(split, 7, 2.0));
+    let reduced = pick(radius, bucket(split, 168, 7));
     let mut all = vec![
-        of("1", Method::One, with(split, 8)),
-        of("2", Method::Two, divided(split, 7, 3.0)),
-        of("3", Method::Three, bucket(split, 2, 5)),
-        of("3b", Method::ThreeB, bucket(split, 2, 7)),
-        of("3bR", Method::ThreeBR, bucket(split, 8, 7)),
-        of("3bR DR/OCL", Method::ThreeBR, bucket(split, 8, 7).reduced(3)),
-        of("4", Method::Four, divided(split, 6, 6.0)),
-        of("4 DR/OCL", Method::Four, divided(split, 6, 6.0).reduced(3)),
+        of("1", Method::One, pick(with(split, 8), with(split, 6))),
+        of("2", Method::Two, pick(divided(split, 7, 3.0), divided(split, 9, 1.0))),
+        of("3", Method::Three, pick(bucket(split, 2, 5), bucket(split, 8, 6))),
+        of("3b", Method::ThreeB, pick(bucket(split, 2, 7), bucket(split, 4, 7))),
+        of("3bR", Method::ThreeBR, radius),
+        of("3bR DR/OCL", Method::ThreeBR, reduced.reduced(pick_depth(thesis, 3, 4))),
+        of("4", Method::Four, four),
+        of("4 DR/OCL", Method::Four, four.reduced(3)),
     ];
     all.extend(beside(split));
     all
+}
+
+fn pick_depth(thesis: bool, published: u8, tuned: u8) -> u8 {
+    if thesis { published } else { tuned }
 }

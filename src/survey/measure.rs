@@ -9,10 +9,11 @@ use serde::Serialize;
 
 use super::Contender;
 use crate::index::Work;
-use crate::math::{Volume, rounded_clip_matrix};
+use crate::math::{Aabb, Volume, rounded_clip_matrix};
 use crate::oracle::part_instance;
 use crate::part::ObjectId;
 use crate::run::{Boxes, World};
+use crate::scene::Camera;
 
 /// How a survey goes.
 #[derive(Clone, Copy, Debug)]
@@ -153,8 +154,43 @@ pub fn survey(
     Some(this)
 }
 
+/// What a contender finds in one frame.
+#[derive(Clone, Debug)]
+pub struct Look {
+    /// World boxes, by id.
+    pub boxes: Vec<Aabb>,
+    /// What it finds, ascending.
+    pub found: Vec<ObjectId>,
+    /// What meets the volume, ascending.
+    pub actual: Vec<ObjectId>,
+    /// Who looks.
+    pub camera: Camera,
+}
+
+/// Runs a contender up to a frame.
+#[must_use]
+pub fn look(world: &World, contender: &Contender, frame: u32) -> Look {
+    let mut boxes = Boxes::first(world);
+    let mut index = contender.build(&world.entries());
+    let mut found = Vec::new();
+    for at in 0..=frame {
+        if at > 0 {
+            boxes.advance(world);
+            index.update(boxes.moves());
+        }
+        found.clear();
+        index.find(boxes.moves().boxes, &volume_at(world, at), &mut found);
+    }
+    found.sort_unstable();
+    let (boxes, volume) = (boxes.moves().boxes.to_vec(), volume_at(world, frame));
+    let meets = |id: &ObjectId| volume.touches(&boxes[id.0 as usize]);
+    let actual = (0..boxes.len() as u32).map(ObjectId).filter(meets).collect();
+    let camera = world.scene.cameras[0].at(world.scene.start + frame);
+    Look { boxes, found, actual, camera }
+}
+
 /// What the scene's first camera sees in a frame.
-fn volume_at(world: &World, frame: u32) -> Volume {
+pub(super) fn volume_at(world: &World, frame: u32) -> Volume {
     let scene = &world.scene;
     let camera = scene.cameras[0].at(scene.start + frame);
     Volume::new(&camera.clip_from_world(scene.viewport, scene.depth), scene.depth)

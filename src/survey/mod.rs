@@ -12,5 +12,5 @@ mod measure;
 mod tune;
 
 pub use contender::{Contender, Method, SCENES, Tuned, contenders};
-pub use measure::{Survey, SurveyKnobs, survey};
+pub use measure::{Look, Survey, SurveyKnobs, look, survey};
 pub use tune::{MOST_FOUND, Trial, tune};

@@ -1,0 +1,217 @@
+//! `compare --thesis`: the trees of Wortel 2011 on its two scenes, beside its table and figures; and `tune`,
+//! which finds their knobs again.
+
+use clap::Args;
+use serde_json::json;
+
+use super::args::{CompareArgs, SceneArgs};
+use super::compare::folder;
+use super::progress::{counting_triangles, progress_bar};
+use super::run::{Named, catch_interrupt, interrupted, matching};
+use super::{CliError, EXIT_HELD, OutFile, Streams};
+use crate::part::PartitionKnobs;
+use crate::report::{
+    claims, found_table, found_view, picture_png, time_table, work_table, wrapped,
+};
+use crate::run::{RunError, World};
+use crate::survey::{
+    MOST_FOUND, SCENES, Survey, SurveyKnobs, Tuned, contenders, look, survey, tune,
+};
+
+/// Of the JSON lines.
+const VERSION: u32 = 1;
+/// Frames where none are asked for.
+const FRAMES: u32 = 60;
+/// What is found is drawn, and held against a look at every box, once in so many frames.
+const RENDER_EVERY: u32 = 10;
+const CHECK_EVERY: u32 = 10;
+/// Pixels along a side of the views from above.
+const VIEW_SIDE: u32 = 900;
+/// Figures 5.3 to 5.5 of the thesis.
+const VIEWS: [(&str, &str); 3] = [("1", "octree-1"), ("list", "actual"), ("4", "octree-4")];
+
+/// The scenes of the thesis, or those of them that are named.
+fn scenes(names: &[String]) -> Result<Vec<&'static Tuned>, CliError> {
+    let known = SCENES.iter().map(|tuned| tuned.scene).collect::<Vec<_>>();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let names = if names.is_empty() {
+        known.iter().map(|&n| n.to_owned()).collect()
+    } else {
+        matching(&names)?
+    };
+    let find = |name: &String| {
+        SCENES.iter().find(|tuned| tuned.scene == name).ok_or_else(|| {
+            CliError::Usage(format!("--scene {name}: the thesis has {}", known.join(" and ")))
+        })
+    };
+    names.iter().map(find).collect()
+}
+
+fn open(tuned: &Tuned, args: &SceneArgs, bar: &indicatif::ProgressBar) -> Result<World, CliError> {
+    let mut args = args.clone();
+    args.frames = args.frames.or(Some(FRAMES));
+    let scene = Named::open(tuned.scene, &args)?.scene().clone();
+    // Nothing is asked of parts: objects stay whole.
+    Ok(counting_triangles(bar, tuned.scene.to_owned(), |progress| {
+        World::make(scene, PartitionKnobs::uncut(), None, progress)
+    }))
+}
+
+fn title(world: &World) -> String {
+    format!(
+        "{}, seed {}: {} objects, {} moving, {} frames",
+        world.scene.name,
+        world.scene.seed,
+        world.partition.object_count(),
+        world.moving_count(),
+        world.scene.frames
+    )
+}
+
+pub(super) fn compare(args: &CompareArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+    let scenes = scenes(&args.scene)?;
+    let out = folder(&args.out)?;
+    catch_interrupt();
+    let bar = progress_bar();
+    let mut lines = String::new();
+    for tuned in scenes {
+        let world = open(tuned, &args.scene_args, &bar)?;
+        let knobs = SurveyKnobs {
+            frames: world.scene.frames,
+            render_every: RENDER_EVERY,
+            check_every: CHECK_EVERY,
+        };
+        let all = contenders(tuned, args.thesis_knobs);
+        bar.set_length(u64::from(knobs.frames) * all.len() as u64);
+        bar.set_position(0);
+        bar.reset_eta();
+        let mut surveys: Vec<Survey> = Vec::new();
+        for contender in &all {
+            bar.set_message(format!("{} {}", tuned.scene, contender.name));
+            let mut tick = || {
+                bar.inc(1);
+                !interrupted()
+            };
+            let done = survey(&world, contender, &knobs, &mut tick);
+            surveys.push(done.ok_or(RunError::Interrupted)?);
+        }
+        for survey in &surveys {
+            let mut line = serde_json::to_value(survey).unwrap_or_default();
+            line["plainsight"] = json!("survey");
+            line["version"] = json!(VERSION);
+            lines += &format!("{line}\n");
+        }
+        let width = streams.width.filter(|_| !args.json);
+        let text = [
+            wrapped(&title(&world), width),
+            time_table(&surveys, width),
+            found_table(&surveys, width),
+            work_table(&surveys, width),
+            claims(&surveys, width),
+        ];
+        if !args.json {
+            bar.suspend(|| writeln!(streams.out, "{}\n", text.join("\n")))?;
+        }
+        for (name, file) in VIEWS {
+            let Some(contender) = all.iter().find(|contender| contender.name == name) else {
+                continue;
+            };
+            let picture = found_view(&look(&world, contender, 0), world.scene.viewport, VIEW_SIDE);
+            let path = out.join(format!("{}-{file}.png", tuned.scene));
+            OutFile::create(&path)?.finish(&picture_png(&picture))?;
+        }
+    }
+    bar.finish_and_clear();
+    if args.json {
+        write!(streams.out, "{lines}")?;
+    }
+    OutFile::create(&out.join("surveys.jsonl"))?.finish(lines.as_bytes())?;
+    let to = if args.json { &mut streams.talk } else { &mut streams.out };
+    writeln!(to, "views from above and figures as JSON lines are in {}", out.display())?;
+    Ok(EXIT_HELD)
+}
+
+#[derive(Args, Clone)]
+pub(super) struct TuneArgs {
+    /// Scenes of the thesis (default: city250k spheres200k).
+    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
+    scene: Vec<String>,
+    /// Contenders by name, as `compare --thesis` lists them (default: all that have knobs).
+    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
+    contender: Vec<String>,
+    /// How many of the best to list.
+    #[arg(long, default_value_t = 3)]
+    best: usize,
+    #[command(flatten)]
+    scene_args: SceneArgs,
+    /// One JSON object a trial on standard output in place of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Frames of a trial where none are asked for.
+const TUNE_FRAMES: u32 = 8;
+
+pub(super) fn tune_verb(args: &TuneArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+    catch_interrupt();
+    let bar = progress_bar();
+    let scenes = scenes(&args.scene)?;
+    for name in &args.contender {
+        let all = || scenes.iter().flat_map(|tuned| contenders(tuned, false));
+        if all().all(|contender| contender.name != name) {
+            let mut names: Vec<&str> = all().map(|contender| contender.name).collect();
+            names.sort_unstable();
+            names.dedup();
+            let known = names.join(", ");
+            return Err(CliError::Usage(format!("--contender {name}: there are {known}")));
+        }
+    }
+    for tuned in scenes {
+        let mut scene_args = args.scene_args.clone();
+        scene_args.frames = scene_args.frames.or(Some(TUNE_FRAMES));
+        let world = open(tuned, &scene_args, &bar)?;
+        if !args.json {
+            bar.suspend(|| writeln!(streams.out, "{}", wrapped(&title(&world), streams.width)))?;
+        }
+        let wanted = |name: &str| {
+            args.contender.is_empty() || args.contender.iter().any(|wanted| wanted == name)
+        };
+        for contender in contenders(tuned, false).into_iter().filter(|c| wanted(c.name)) {
+            bar.set_message(format!("{} {}", tuned.scene, contender.name));
+            bar.set_position(0);
+            let trials = tune(&world, &contender, world.scene.frames, &mut |count| {
+                bar.set_length(count as u64);
+                bar.inc(1);
+                !interrupted()
+            });
+            if interrupted() {
+                return Err(RunError::Interrupted.into());
+            }
+            bar.suspend(|| {
+                for trial in trials.iter().take(args.best.max(1)) {
+                    if args.json {
+                        let mut line = serde_json::to_value(trial).unwrap_or_default();
+                        line["plainsight"] = json!("tune");
+                        line["version"] = json!(VERSION);
+                        line["scene"] = json!(tuned.scene);
+                        line["contender"] = json!(contender.name);
+                        writeln!(streams.out, "{line}")?;
+                    } else {
+                        let over = if trial.ratio() > MOST_FOUND { ", above the rule" } else { "" };
+                        writeln!(
+                            streams.out,
+                            "{:<13} {:<44} finds {:.3}, costs {:.3} ms{over}",
+                            contender.name,
+                            trial.knobs,
+                            trial.ratio(),
+                            trial.cost_ns / 1e6
+                        )?;
+                    }
+                }
+                Ok::<(), std::io::Error>(())
+            })?;
+        }
+    }
+    bar.finish_and_clear();
+    Ok(EXIT_HELD)
+}
