@@ -21,6 +21,7 @@
 //! | [`fault`] | real bug classes seeded in cullers, oracles, indexes and math; trials of the gate | reports |
 //! | [`stress`] | worlds picked by seeds, run and judged by the thousand; shrinking what fails | reports |
 //! | [`accuracy`] | what each knob loses and what it takes, beside the exact run | reports |
+//! | [`survey`] | what indexes over moving objects cost, beside the thesis that compared them | reports |
 //! | [`foreign`] | what cullers of other engines are told and what they answer | how it is judged, reports |
 //! | [`report`] | tables and pictures | |
 //! | [`cli`] | verbs; wires checks to runs | |

@@ -26,7 +26,7 @@ const FRAMES: u32 = 60;
 const RENDER_EVERY: u32 = 10;
 const CHECK_EVERY: u32 = 10;
 /// Pixels along a side of the views from above.
-const VIEW_SIDE: u32 = 900;
+const VIEW_SIDE: u32 = 640;
 /// Figures 5.3 to 5.5 of the thesis.
 const VIEWS: [(&str, &str); 3] = [("1", "octree-1"), ("list", "actual"), ("4", "octree-4")];
 

@@ -13,8 +13,8 @@
 
 use glam::DVec3;
 
-use super::tree::{Rules, Thing, Tree, TreeKnobs};
-use super::{Entry, Index};
+use super::tree::{Rules, Thing, Tree};
+use super::{Entry, Index, TreeKnobs};
 use crate::math::Aabb;
 
 /// As in Octree 4: what the middle and half side of a box may be off by, of the largest coordinate.

@@ -9,6 +9,7 @@ mod list;
 mod loose_octree;
 mod octree;
 mod tree;
+mod tree_knobs;
 mod two_level_bsp;
 
 use std::borrow::Cow;
@@ -24,7 +25,7 @@ pub use lazy_grid::{GridKnobs, LazyGrid};
 pub use list::List;
 pub use loose_octree::{LooseKnobs, loose_octree};
 pub use octree::{octree, overlapping_octree};
-pub use tree::{Split, TreeKnobs};
+pub use tree_knobs::{Split, TreeKnobs};
 pub use two_level_bsp::TwoLevelBsp;
 
 /// A node of an index. Node 0 is the root.

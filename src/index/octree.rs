@@ -9,8 +9,8 @@
 //! From the thesis's future work: depth reduction, by a smaller greatest depth in updates, and leaves with
 //! one object looked at by its box. Checklists do not fit: what may sink has no distance from a border.
 
-use super::tree::{Rules, Thing, Tree, TreeKnobs};
-use super::{Entry, Index};
+use super::tree::{Rules, Thing, Tree};
+use super::{Entry, Index, TreeKnobs};
 use crate::math::Aabb;
 
 /// By the smallest box that holds an object.

@@ -122,7 +122,7 @@ pub fn top_view(world: &World, state: &FrameState, shown: &Shown<'_>, side: u32)
 }
 
 /// A crowd from above (x to the right, z down), as Figures 5.3 to 5.5 of Wortel 2011: what was found, black
-/// where it meets the view volume and amber where it does not, above grey for the rest; the camera and its
+/// where it meets the view volume and amber where it does not, within the space of all; the camera and its
 /// frustum as far as it sees.
 #[must_use]
 pub fn found_view(look: &Look, viewport: Viewport, side: u32) -> RgbImage {
@@ -146,12 +146,17 @@ pub fn found_view(look: &Look, viewport: Viewport, side: u32) -> RgbImage {
             }
         }
     };
-    let all = 0..look.boxes.len() as u32;
     let known = |id: &ObjectId| !look.boxes[id.0 as usize].is_empty();
-    dots(&mut all.map(ObjectId).filter(known), [225; 3]);
     let meets = |id: &ObjectId| look.actual.binary_search(id).is_ok();
     dots(&mut look.found.iter().copied().filter(|id| known(id) && !meets(id)), FATES[1]);
     dots(&mut look.found.iter().copied().filter(|id| known(id) && meets(id)), [20; 3]);
+    let ((x0, y0), (x1, y1)) = (place(space.min), place(space.max));
+    if let Some(rect) = Rect::from_ltrb(x0, y0, x1.max(x0 + 1.0), y1.max(y0 + 1.0)) {
+        let mut paint = Paint::default();
+        paint.set_color_rgba8(160, 160, 160, 255);
+        let path = PathBuilder::from_rect(rect);
+        pixmap.stroke_path(&path, &paint, &Stroke::default(), Transform::identity(), None);
+    }
     frustum(&mut pixmap, (&look.camera, viewport), look.camera.far.min(reach * 1.5), &place);
     let rgb = pixmap.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
     RgbImage::from_raw(pixmap.width(), pixmap.height(), rgb).expect("three bytes a pixel")

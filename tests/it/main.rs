@@ -28,6 +28,7 @@ mod report;
 mod simulated;
 mod snapshots;
 mod stress;
+mod survey;
 mod tidy;
 mod tolerance;
 mod why;
