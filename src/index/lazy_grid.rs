@@ -366,27 +366,44 @@ impl LazyGrid {
         }
     }
 
-    /// Brings the objects of a cell that is looked at as far down as one level.
+    /// Brings the objects of a cell that is looked at down a level, those that a part of it keeps.
     fn lower(&mut self, cell: u32, boxes: &[Aabb]) {
         let level = self.cells[cell as usize].level;
-        let mut place = 0;
-        while let Some(&id) = self.cells[cell as usize].objects.get(place) {
-            let bounds = &boxes[id.0 as usize];
-            let part = if self.deepest[id.0 as usize] > level && !bounds.is_empty() {
-                self.part_for(cell, bounds.center())
-            } else {
-                None
-            };
-            let Some(part) = part else {
-                place += 1;
-                continue;
-            };
-            // The object at the end takes its place.
-            self.relink(id, place, part);
-            self.work.lowered += 1;
-            let room = self.room(part, bounds.center());
-            self.schedule(id, room);
+        if usize::from(level) + 1 == self.levels.len() {
+            return;
         }
+        let mut objects = std::mem::take(&mut self.cells[cell as usize].objects);
+        let (mut kept, mut next) = (0, 0);
+        while next < objects.len() {
+            let end = objects.len().min(next + READ_AHEAD);
+            let mut middles = [DVec3::ZERO; READ_AHEAD];
+            for (at, &id) in middles.iter_mut().zip(&objects[next..end]) {
+                *at = boxes[id.0 as usize].center();
+            }
+            for place in next..end {
+                let (id, at) = (objects[place], middles[place - next]);
+                // The middle of an empty box is not a number, and no part keeps that.
+                let part = if self.deepest[id.0 as usize] > level {
+                    self.part_for(cell, at)
+                } else {
+                    None
+                };
+                if let Some(part) = part {
+                    self.homes[id.0 as usize].cell = part;
+                    self.cells[part as usize].objects.push(id);
+                    self.count(part, Some(cell));
+                    self.work.lowered += 1;
+                    let room = self.room(part, at);
+                    self.schedule(id, room);
+                } else {
+                    objects[kept] = id;
+                    kept += 1;
+                }
+            }
+            next = end;
+        }
+        objects.truncate(kept);
+        self.cells[cell as usize].objects = objects;
     }
 
     /// Goes through what meets the volume and brings it down; `found` is told of objects, and of the planes
@@ -468,9 +485,18 @@ impl Index for LazyGrid {
         self.walk(boxes, volume, &mut |objects, planes| {
             if planes.is_empty() {
                 found.extend_from_slice(objects);
-            } else {
-                let meets = |id: &&ObjectId| volume.touches_planes(&boxes[id.0 as usize], planes);
-                found.extend(objects.iter().filter(meets));
+                return;
+            }
+            for ids in objects.chunks(READ_AHEAD) {
+                // All of them are read before any is decided on: a decision taken wrongly in advance would
+                // throw the reads away.
+                let mut near = [Aabb::EMPTY; READ_AHEAD];
+                for (bounds, &id) in near.iter_mut().zip(ids) {
+                    *bounds = boxes[id.0 as usize];
+                }
+                let meets =
+                    |(_, bounds): &(&ObjectId, &Aabb)| volume.touches_planes(bounds, planes);
+                found.extend(ids.iter().zip(&near).filter(meets).map(|(&id, _)| id));
             }
         });
     }

@@ -10,7 +10,8 @@ use plainsight::oracle::{
 };
 use plainsight::part::{PartId, PartitionKnobs};
 use plainsight::run::{
-    FrameState, Lane, LaneInfo, Moment, Repeat, Truth, World, fates_of_parts, run,
+    FrameState, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, Truth, World, fates_of_parts,
+    run,
 };
 use plainsight::scene::generate::{Knobs, build};
 use plainsight::scene::{Scene, Viewport};
@@ -201,10 +202,33 @@ fn misses_point_at_the_first_pixel() {
 /// Exactly eight misses are all named, and none is "more".
 #[test]
 fn eight_misses_are_all_named() {
-    let verdict = judged(|visible| visible[..1].to_vec());
+    let left = |count: usize, frame| shows(&world(), frame)[..count].to_vec();
+    let out: Vec<Vec<PartId>> = [3, 3, 2].into_iter().zip(0..).map(|(n, f)| left(n, f)).collect();
+    let draws = move || Draws { leaves_out: <[PartId]>::to_vec, visible: out.clone() };
+    let verdict = judge(scene(), move |_| Box::new(draws())).unwrap();
     let lines = verdict.gate.failures();
-    assert_eq!(lines.iter().filter(|line| line.starts_with("set: ")).count(), FRAMES as usize);
+    assert_eq!(lines.iter().filter(|line| line.starts_with("set: frame")).count(), 8);
     assert!(!lines.iter().any(|line| line.contains("more misses")), "{lines:?}");
+    let words = verdict.to_string();
+    assert!(words.starts_with("failed: draws on "), "{words}");
+    assert!(words.contains(", 3 frames, drew ") && words.contains("set: frame"), "{words}");
+}
+
+/// Where all events were the same, what else was not is named.
+#[test]
+fn what_did_not_repeat_is_named() {
+    let verdict = judged(nothing);
+    let first = &verdict.trace.frames[0];
+    let words = |change: fn(&mut FrameTrace)| {
+        let (mut gate, mut again) = (Gate::default(), first.clone());
+        change(&mut again);
+        gate.repeated(first, &again);
+        gate.determinism.first_event().to_owned()
+    };
+    assert_eq!(words(|_| {}), "");
+    let was_not = |what: &str| format!("all events were the same, {what} was not");
+    assert_eq!(words(|t| t.truth_hash ^= 1), was_not("the truth's image"));
+    assert_eq!(words(|t| t.image_hash ^= 1), was_not("the image of what was drawn"));
 }
 
 #[test]
@@ -278,6 +302,8 @@ fn lateness_is_forgiven_up_to_what_is_declared() {
         |allowed: u32| before(Gate::forgiving(allowed), Flaws::default(), |_| vec![throughout()]);
     let strict = missing(0);
     assert_eq!((strict.conservative.misses().len(), strict.word()), (3, "failed".to_owned()));
+    // Pictures are compared where nothing may be late, and only there.
+    assert_eq!(strict.image.differences().len(), FRAMES as usize);
     let two = missing(2);
     let misses = two.conservative.misses();
     assert_eq!((misses.len(), misses[0].moment.frame, misses[0].part), (1, 2, first));
