@@ -126,9 +126,9 @@ if [ "$(uname -sm)" = "Linux x86_64" ]; then
 else
   echo "tests/run.sh: SwiftShader is fetched for Linux on x86_64 alone; the tests that need it will fail" >&2
 fi
-# The driver gives large blocks back to the system after every batch; keeping them saves half its time.
 # Mesa complains on standard error without one, where tests look for a single line.
 if [ -z "${XDG_RUNTIME_DIR:-}" ]; then export XDG_RUNTIME_DIR=/tmp; fi
+# The driver gives large blocks back to the system after every batch; keeping them saves half its time.
 export MALLOC_TRIM_THRESHOLD_=8589934592 MALLOC_MMAP_THRESHOLD_=1073741824 MALLOC_TOP_PAD_=67108864
 
 exec cargo test --workspace --locked "$@"

@@ -14,11 +14,8 @@
 use glam::DVec3;
 
 use super::tree::{Rules, Thing, Tree};
-use super::{Entry, Index, TreeKnobs};
+use super::{Entry, Index, MIDDLE_ROUNDING, TreeKnobs};
 use crate::math::Aabb;
-
-/// As in Octree 4: what the middle and half side of a box may be off by, of the largest coordinate.
-const MIDDLE_ROUNDING: f64 = 1.0 / (1_u64 << 49) as f64;
 
 /// Who fits in a bucket, and where.
 #[derive(Clone, Copy, Debug)]

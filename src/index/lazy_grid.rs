@@ -4,9 +4,9 @@
 //! (depth reduction, section 3.5.1 there) and looked at in updates only when they may have left
 //! (checklists, section 3.5.2). What it does otherwise:
 //!
-//! 1. **Borders with slack.** A cell keeps an object while its middle is within half a cell of the cell.
-//!    One that is looked at and is in the outer half of that goes to the cell that its middle is in, where
-//!    every border is half a cell away again: nobody is looked at in frame after frame for being near a
+//! 1. **Borders with slack.** A cell keeps an object while its middle is within a quarter of a cell
+//!    of the cell ([`SLACK`]). One that is looked at and is in the outer half of that goes to the cell that
+//!    its middle is in, where every border is a quarter of a cell away again: nobody is looked at in frame after frame for being near a
 //!    border.
 //! 2. **Back up in one go.** It goes [`CLIMB`] levels up, to where it need not be looked at for long;
 //!    finding brings it down where that is needed. So what is far from the view comes to lie in ever larger
@@ -24,13 +24,13 @@ use std::borrow::Cow;
 use glam::DVec3;
 
 use super::checklist::{Checklists, Due};
-use super::{Entry, Index, Moves, Node, NodeId, Work};
+use super::{Entry, Index, MIDDLE_ROUNDING, Moves, Node, NodeId, Work, rounded_up};
 use crate::math::{Aabb, Planes, Volume};
 use crate::part::ObjectId;
 
-/// Beyond a cell, of its shorter side, an object may wander.
+/// Beyond a cell, of the length of a cell along the longest side of the space, an object may wander.
 const SLACK: f64 = 0.25;
-/// Of a cell's shorter side, the largest half side of an object that may lie in it.
+/// Of the same length, the largest half side of an object that may lie in it.
 const LARGEST: f64 = 0.5;
 /// Levels that an object goes up when it leaves its cell.
 const CLIMB: u8 = 2;
@@ -40,10 +40,6 @@ const FIRST: u8 = 3;
 const AHEAD: u32 = 4096;
 /// Objects that are due whose memory is read ahead of the decisions, so that the reads overlap.
 const READ_AHEAD: usize = 32;
-/// What the middle and half side of a box may be off by, of the largest coordinate: two roundings of
-/// 2⁻⁵³ each; sixteen of them.
-const MIDDLE_ROUNDING: f64 = 1.0 / (1_u64 << 49) as f64;
-
 /// The knob of the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridKnobs {
@@ -105,12 +101,6 @@ pub struct LazyGrid {
     work: Work,
 }
 
-/// The next f32 that is no less, so that bounds stay bounds.
-fn rounded_up(value: f64) -> f32 {
-    let near = value as f32;
-    if f64::from(near) < value { near.next_up() } else { near }
-}
-
 impl LazyGrid {
     /// Over the boxes of frame 0.
     #[must_use]
@@ -133,8 +123,8 @@ impl LazyGrid {
             let size = DVec3::from_array(std::array::from_fn(|axis| {
                 space.size()[axis] / f64::from(1_u32 << bits[axis])
             }));
-            let shorter = longest / f64::from(1_u32 << depth);
-            levels.push(Level { bits, first: count, size, slack: shorter * SLACK, reach: 0.0 });
+            let length = longest / f64::from(1_u32 << depth);
+            levels.push(Level { bits, first: count, size, slack: length * SLACK, reach: 0.0 });
             let cells = 1_u32 << bits.iter().sum::<u32>();
             count += cells;
             if f64::from(cells) * knobs.per_cell >= entries.len() as f64 || depth >= 9 {

@@ -14,12 +14,8 @@
 use glam::DVec3;
 
 use super::tree::{Rules, Thing, Tree};
-use super::{Entry, Index, TreeKnobs};
+use super::{Entry, Index, MIDDLE_ROUNDING, TreeKnobs};
 use crate::math::Aabb;
-
-/// What the middle and half side of a box may be off by, of the largest coordinate: two roundings of
-/// 2⁻⁵³ each; sixteen of them.
-const MIDDLE_ROUNDING: f64 = 1.0 / (1_u64 << 49) as f64;
 
 /// What Octree 4 can be told beside [`TreeKnobs`].
 #[derive(Clone, Copy, Debug, PartialEq)]

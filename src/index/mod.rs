@@ -73,6 +73,16 @@ impl Moves<'_> {
     }
 }
 
+/// What the middle and half side of a box may be off by, of the largest coordinate: two roundings of
+/// 2⁻⁵³ each; sixteen of them.
+const MIDDLE_ROUNDING: f64 = 1.0 / (1_u64 << 49) as f64;
+
+/// The next f32 that is no less, so that bounds stay bounds.
+fn rounded_up(value: f64) -> f32 {
+    let near = value as f32;
+    if f64::from(near) < value { near.next_up() } else { near }
+}
+
 /// Operations of an index, in the words of Wortel 2011, section 4.1. The same for the same moves and
 /// volumes, everywhere.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -19,7 +19,7 @@ use glam::DVec3;
 
 use super::checklist::{Checklists, Due};
 use super::tree_knobs::{Split, TreeKnobs};
-use super::{Entry, Index, Moves, Node, NodeId, Work};
+use super::{Entry, Index, Moves, Node, NodeId, Work, rounded_up};
 use crate::math::{Aabb, Planes, Volume};
 use crate::part::ObjectId;
 
@@ -133,12 +133,6 @@ fn headroom(space: &Aabb) -> Aabb {
 fn inside(space: &Aabb, bounds: &Aabb) -> f64 {
     let at = bounds.center();
     (at - space.min).min(space.max - at).min_element()
-}
-
-/// The next f32 that is no less, so that bounds stay bounds.
-fn rounded_up(value: f64) -> f32 {
-    let near = value as f32;
-    if f64::from(near) < value { near.next_up() } else { near }
 }
 
 impl Home {
