@@ -221,6 +221,9 @@ pub(super) struct CompareArgs {
     /// With --thesis: the knobs that the thesis gives for its scenes, not those tuned for these.
     #[arg(long, requires = "thesis")]
     pub(super) thesis_knobs: bool,
+    /// With --thesis: also the indexes of its related work and the options of its future work.
+    #[arg(long, requires = "thesis")]
+    pub(super) beyond: bool,
 }
 
 #[derive(Args, Clone)]

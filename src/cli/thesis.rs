@@ -15,7 +15,8 @@ use crate::report::{
 };
 use crate::run::{RunError, World};
 use crate::survey::{
-    MOST_FOUND, SCENES, Survey, SurveyKnobs, Tuned, contenders, look, survey, tune,
+    Contender, MOST_FOUND, SCENES, Survey, SurveyKnobs, Tuned, beyond, contenders, look, survey,
+    tune,
 };
 
 /// Of the JSON lines.
@@ -81,7 +82,10 @@ pub(super) fn compare(args: &CompareArgs, streams: &mut Streams<'_>) -> Result<u
             render_every: RENDER_EVERY,
             check_every: CHECK_EVERY,
         };
-        let all = contenders(tuned, args.thesis_knobs);
+        let mut all = contenders(tuned, args.thesis_knobs);
+        if args.beyond {
+            all.extend(beyond(tuned));
+        }
         bar.set_length(u64::from(knobs.frames) * all.len() as u64);
         bar.set_position(0);
         bar.reset_eta();
@@ -136,7 +140,7 @@ pub(super) struct TuneArgs {
     /// Scenes of the thesis (default: city250k spheres200k).
     #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
     scene: Vec<String>,
-    /// Contenders by name, as `compare --thesis` lists them (default: all that have knobs).
+    /// Contenders by name, as `compare --thesis --beyond` lists them (default: those of the thesis).
     #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
     contender: Vec<String>,
     /// How many of the best to list.
@@ -156,10 +160,11 @@ pub(super) fn tune_verb(args: &TuneArgs, streams: &mut Streams<'_>) -> Result<u8
     catch_interrupt();
     let bar = progress_bar();
     let scenes = scenes(&args.scene)?;
+    let all_of = |tuned: &Tuned| [contenders(tuned, false), beyond(tuned)].concat();
     for name in &args.contender {
-        let all = || scenes.iter().flat_map(|tuned| contenders(tuned, false));
-        if all().all(|contender| contender.name != name) {
-            let mut names: Vec<&str> = all().map(|contender| contender.name).collect();
+        let all: Vec<Contender> = scenes.iter().flat_map(|tuned| all_of(tuned)).collect();
+        if all.iter().all(|contender| contender.name != name) {
+            let mut names: Vec<&str> = all.iter().map(|contender| contender.name).collect();
             names.sort_unstable();
             names.dedup();
             let known = names.join(", ");
@@ -173,10 +178,12 @@ pub(super) fn tune_verb(args: &TuneArgs, streams: &mut Streams<'_>) -> Result<u8
         if !args.json {
             bar.suspend(|| writeln!(streams.out, "{}", wrapped(&title(&world), streams.width)))?;
         }
-        let wanted = |name: &str| {
-            args.contender.is_empty() || args.contender.iter().any(|wanted| wanted == name)
-        };
-        for contender in contenders(tuned, false).into_iter().filter(|c| wanted(c.name)) {
+        let mut all = contenders(tuned, false);
+        if !args.contender.is_empty() {
+            all = all_of(tuned);
+            all.retain(|contender| args.contender.iter().any(|wanted| wanted == contender.name));
+        }
+        for contender in all {
             bar.set_message(format!("{} {}", tuned.scene, contender.name));
             bar.set_position(0);
             let trials = tune(&world, &contender, world.scene.frames, &mut |count| {

@@ -4,10 +4,13 @@
 
 mod bucket_octree;
 mod checklist;
+mod irregular_octree;
 mod lazy_grid;
 mod list;
 mod loose_octree;
 mod octree;
+mod regular_grid;
+mod temporal_volumes;
 mod tree;
 mod tree_knobs;
 mod two_level_bsp;
@@ -21,10 +24,13 @@ use crate::math::{Aabb, Meets, Volume};
 use crate::part::ObjectId;
 
 pub use bucket_octree::{bounds_octree, extents_octree, radius_octree};
+pub use irregular_octree::IrregularOctree;
 pub use lazy_grid::{GridKnobs, LazyGrid};
 pub use list::List;
 pub use loose_octree::{LooseKnobs, loose_octree};
 pub use octree::{octree, overlapping_octree};
+pub use regular_grid::RegularGrid;
+pub use temporal_volumes::TemporalVolumes;
 pub use tree_knobs::{Split, TreeKnobs};
 pub use two_level_bsp::TwoLevelBsp;
 
@@ -339,6 +345,38 @@ pub const INDEXES: &[IndexKind] = &[
         build: |entries| {
             let knobs = usual(Split::Quadrants, entries).reduced(REDUCTION);
             loose_octree(entries, knobs, LooseKnobs::default())
+        },
+    },
+    IndexKind {
+        name: "irregular-octree",
+        summary: "of Shagam & Pfeiffer 2003: parted where its objects are, objects go down when looked at",
+        build: |entries| {
+            let knobs =
+                TreeKnobs { max_depth: TreeKnobs::DEEPEST, ..usual(Split::Octants, entries) };
+            Box::new(IrregularOctree::new(entries, knobs))
+        },
+    },
+    IndexKind {
+        name: "regular-grid",
+        summary: "of Batagelo & Wu 2002: one level of cells",
+        build: |entries| Box::new(RegularGrid::new(entries, GridKnobs::default())),
+    },
+    IndexKind {
+        name: "temporal-grid",
+        summary: "the same over temporal bounding volumes, which objects cannot leave for some frames",
+        build: |entries| {
+            let grid = |held: &[Entry]| -> Box<dyn Index> {
+                Box::new(RegularGrid::new(held, GridKnobs::default()))
+            };
+            Box::new(TemporalVolumes::new("temporal-grid", entries, grid))
+        },
+    },
+    IndexKind {
+        name: "temporal-octree",
+        summary: "of Sudarsky & Gotsman 1999: an octree over temporal bounding volumes",
+        build: |entries| {
+            let tree = |held: &[Entry]| octree(held, usual(Split::Octants, held));
+            Box::new(TemporalVolumes::new("temporal-octree", entries, tree))
         },
     },
 ];

@@ -3,8 +3,9 @@
 //! to be about 1.1 times what there is; `plainsight tune` finds them again.
 
 use crate::index::{
-    Entry, GridKnobs, Index, LazyGrid, List, LooseKnobs, Split, TreeKnobs, TwoLevelBsp,
-    bounds_octree, extents_octree, loose_octree, octree, overlapping_octree, radius_octree,
+    Entry, GridKnobs, Index, IrregularOctree, LazyGrid, List, LooseKnobs, RegularGrid, Split,
+    TemporalVolumes, TreeKnobs, TwoLevelBsp, bounds_octree, extents_octree, loose_octree, octree,
+    overlapping_octree, radius_octree,
 };
 
 /// A tree of the thesis, or something beside it.
@@ -22,6 +23,14 @@ pub enum Method {
     ThreeBR,
     /// Middles say where, sizes how deep.
     Four,
+    /// Parted where its objects are, which go down when looked at.
+    Irregular,
+    /// One level of cells.
+    RegularGrid,
+    /// The same over temporal bounding volumes.
+    TemporalGrid,
+    /// Octree 1 over temporal bounding volumes.
+    TemporalOctree,
     /// The two-level BSP's scene tree.
     Bsp,
     /// Grids over one another, this project's own.
@@ -39,6 +48,8 @@ pub struct Contender {
     pub method: Method,
     /// Its knobs; those it does not have are ignored.
     pub knobs: TreeKnobs,
+    /// Those of tree 4 alone.
+    pub loose: LooseKnobs,
 }
 
 impl Contender {
@@ -46,13 +57,23 @@ impl Contender {
     #[must_use]
     pub fn build(&self, entries: &[Entry]) -> Box<dyn Index> {
         let knobs = self.knobs;
+        let grid = |held: &[Entry]| -> Box<dyn Index> {
+            Box::new(RegularGrid::new(held, GridKnobs::default()))
+        };
         match self.method {
             Method::One => octree(entries, knobs),
             Method::Two => overlapping_octree(entries, knobs),
             Method::Three => bounds_octree(entries, knobs),
             Method::ThreeB => extents_octree(entries, knobs),
             Method::ThreeBR => radius_octree(entries, knobs),
-            Method::Four => loose_octree(entries, knobs, LooseKnobs::default()),
+            Method::Four => loose_octree(entries, knobs, self.loose),
+            Method::Irregular => Box::new(IrregularOctree::new(entries, knobs)),
+            Method::RegularGrid => grid(entries),
+            Method::TemporalGrid => Box::new(TemporalVolumes::new("temporal-grid", entries, grid)),
+            Method::TemporalOctree => {
+                let tree = |held: &[Entry]| octree(held, knobs);
+                Box::new(TemporalVolumes::new("temporal-octree", entries, tree))
+            }
             Method::Bsp => Box::new(TwoLevelBsp::new(entries)),
             Method::LazyGrid => Box::new(LazyGrid::new(entries, GridKnobs::default())),
             Method::List => Box::new(List::new(entries)),
@@ -65,13 +86,23 @@ impl Contender {
         let TreeKnobs { max_depth, size_divisor, capacity, start_depth, depth_reduction, .. } =
             self.knobs;
         let mut words = match self.method {
-            Method::One => format!("depth {max_depth}"),
+            Method::One | Method::TemporalOctree => format!("depth {max_depth}"),
+            Method::Irregular => format!("{capacity} a node"),
             Method::Two | Method::Four => format!("depth {max_depth}, divisor {size_divisor}"),
             Method::Three | Method::ThreeB | Method::ThreeBR => {
                 format!("{capacity} a node, start {start_depth}")
             }
-            Method::Bsp | Method::LazyGrid | Method::List => String::new(),
+            _ => String::new(),
         };
+        if self.loose.shrink != LooseKnobs::default().shrink {
+            words += &format!(", shrinking by {}", self.loose.shrink);
+        }
+        if self.loose.largest {
+            words += ", by the largest below";
+        }
+        if self.knobs.leaf_boxes {
+            words += ", leaves by boxes";
+        }
         if depth_reduction > 0 {
             words += &format!(", reduced by {depth_reduction}");
         }
@@ -91,18 +122,36 @@ pub struct Tuned {
     pub split: Split,
     /// Whether the knobs are the thesis's own, or tuned on the scenes of this bench.
     contenders: fn(bool) -> Vec<Contender>,
+    /// What the thesis names and does not measure.
+    beyond: fn() -> Vec<Contender>,
 }
 
 /// The scenes of the thesis.
 pub const SCENES: &[Tuned] = &[
-    Tuned { scene: "city250k", split: Split::Quadrants, contenders: city },
-    Tuned { scene: "spheres200k", split: Split::Octants, contenders: spheres },
+    Tuned { scene: "city250k", split: Split::Quadrants, contenders: city, beyond: beyond_city },
+    Tuned {
+        scene: "spheres200k",
+        split: Split::Octants,
+        contenders: spheres,
+        beyond: beyond_spheres,
+    },
 ];
 
 /// The contenders on a scene of [`SCENES`], with the knobs that the thesis gives or with those tuned here.
 #[must_use]
 pub fn contenders(scene: &Tuned, thesis: bool) -> Vec<Contender> {
     (scene.contenders)(thesis)
+}
+
+/// What the thesis names and does not measure, with knobs tuned here: the indexes of its related work
+/// (section 2.2), and the options of its future work (section 6.2).
+#[must_use]
+pub fn beyond(scene: &Tuned) -> Vec<Contender> {
+    (scene.beyond)()
+}
+
+fn of(name: &'static str, method: Method, knobs: TreeKnobs) -> Contender {
+    Contender { name, method, knobs, loose: LooseKnobs::default() }
 }
 
 fn with(split: Split, max_depth: u8) -> TreeKnobs {
@@ -120,16 +169,15 @@ fn divided(split: Split, max_depth: u8, size_divisor: f64) -> TreeKnobs {
 fn beside(split: Split) -> [Contender; 3] {
     let knobs = TreeKnobs::usual(split, 0);
     [
-        Contender { name: "two-level BSP", method: Method::Bsp, knobs },
-        Contender { name: "lazy grid", method: Method::LazyGrid, knobs },
-        Contender { name: "list", method: Method::List, knobs },
+        of("two-level BSP", Method::Bsp, knobs),
+        of("lazy grid", Method::LazyGrid, knobs),
+        of("list", Method::List, knobs),
     ]
 }
 
 /// Wortel 2011, section 5.2.1, the list for Figure 5.8.
 fn city(thesis: bool) -> Vec<Contender> {
     let split = Split::Quadrants;
-    let of = |name, method, knobs| Contender { name, method, knobs };
     let pick = |published: TreeKnobs, tuned: TreeKnobs| if thesis { published } else { tuned };
     let four = divided(split, 10, if thesis { 2.0 } else { 4.0 });
     let mut all = vec![
@@ -147,7 +195,6 @@ fn city(thesis: bool) -> Vec<Contender> {
 /// The same for Figure 5.6.
 fn spheres(thesis: bool) -> Vec<Contender> {
     let split = Split::Octants;
-    let of = |name, method, knobs| Contender { name, method, knobs };
     let pick = |published: TreeKnobs, tuned: TreeKnobs| if thesis { published } else { tuned };
     let radius = pick(bucket(split, 8, 7), bucket(split, 4, 7));
     let four = pick(divided(split, 6, 6.0), divided(split, 7, 2.0));
@@ -168,4 +215,61 @@ fn spheres(thesis: bool) -> Vec<Contender> {
 
 fn pick_depth(thesis: bool, published: u8, tuned: u8) -> u8 {
     if thesis { published } else { tuned }
+}
+
+/// Depth reduction alone.
+fn higher(knobs: TreeKnobs, depth_reduction: u8) -> TreeKnobs {
+    TreeKnobs { depth_reduction, ..knobs }
+}
+
+fn leaves(knobs: TreeKnobs) -> TreeKnobs {
+    TreeKnobs { leaf_boxes: true, ..knobs }
+}
+
+fn four(name: &'static str, knobs: TreeKnobs, loose: LooseKnobs) -> Contender {
+    Contender { loose, ..of(name, Method::Four, knobs) }
+}
+
+const LARGEST: LooseKnobs = LooseKnobs { shrink: 0.5, largest: true };
+
+fn beyond_city() -> Vec<Contender> {
+    let split = Split::Quadrants;
+    let (one, two) = (with(split, 9), divided(split, 9, 3.0));
+    let (radius, loose) = (bucket(split, 8, 8), divided(split, 10, 4.0));
+    let slow = LooseKnobs { shrink: 0.6, largest: false };
+    vec![
+        of("1 DR", Method::One, higher(one, 3)),
+        of("1 LB", Method::One, leaves(one)),
+        of("2 DR", Method::Two, higher(two, 3)),
+        of("2 LB", Method::Two, leaves(two)),
+        of("3bR LB", Method::ThreeBR, leaves(radius)),
+        four("4 sizes", loose, slow),
+        four("4 largest", loose, LARGEST),
+        of("irregular", Method::Irregular, bucket(split, 32, 0)),
+        of("regular grid", Method::RegularGrid, loose),
+        of("TBV grid", Method::TemporalGrid, loose),
+        of("TBV 1", Method::TemporalOctree, one),
+    ]
+}
+
+fn beyond_spheres() -> Vec<Contender> {
+    let split = Split::Octants;
+    let (one, two) = (with(split, 6), divided(split, 9, 1.0));
+    let (radius, loose) = (bucket(split, 4, 7), divided(split, 7, 2.0));
+    let slow = LooseKnobs { shrink: 0.6, largest: false };
+    vec![
+        of("1 DR", Method::One, higher(one, 3)),
+        of("1 LB", Method::One, leaves(one)),
+        of("2 DR", Method::Two, higher(two, 3)),
+        of("2 LB", Method::Two, leaves(two)),
+        of("3 LB", Method::Three, leaves(bucket(split, 8, 6))),
+        of("3b LB", Method::ThreeB, leaves(bucket(split, 4, 7))),
+        of("3bR LB", Method::ThreeBR, leaves(radius)),
+        four("4 sizes", loose, slow),
+        four("4 largest", loose, LARGEST),
+        of("irregular", Method::Irregular, bucket(split, 32, 0)),
+        of("regular grid", Method::RegularGrid, loose),
+        of("TBV grid", Method::TemporalGrid, loose),
+        of("TBV 1", Method::TemporalOctree, one),
+    ]
 }

@@ -11,6 +11,6 @@ mod contender;
 mod measure;
 mod tune;
 
-pub use contender::{Contender, Method, SCENES, Tuned, contenders};
+pub use contender::{Contender, Method, SCENES, Tuned, beyond, contenders};
 pub use measure::{Look, Survey, SurveyKnobs, look, survey};
 pub use tune::{MOST_FOUND, Trial, tune};

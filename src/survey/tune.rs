@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::measure::volume_at;
 use super::{Contender, Method};
-use crate::index::{Entry, TreeKnobs, Work};
+use crate::index::{Entry, LooseKnobs, TreeKnobs, Work};
 use crate::math::{Aabb, Volume};
 use crate::part::ObjectId;
 use crate::run::{Boxes, World};
@@ -29,6 +29,9 @@ const COSTS: [(f64, Count); 5] = [
 ];
 /// Knobs of a method that are tried with depth reduction too.
 const BEST_PLAIN: usize = 4;
+
+/// Sizes of a level's nodes, of those a level above, that are tried of a contender with other than halves.
+const SHRINKS: [f64; 4] = [0.4, 0.6, 0.7, 0.8];
 
 /// Of an object that is where it belongs: looked at in turn, or where a checklist says.
 const OK_COST: f64 = 25.0;
@@ -114,13 +117,13 @@ impl Course {
     }
 }
 
-/// The knobs that are tried of a method.
-fn grid(contender: &Contender) -> Vec<TreeKnobs> {
+/// What is tried of a contender, without depth reduction.
+fn grid(contender: &Contender) -> Vec<Contender> {
     let base = TreeKnobs { depth_reduction: 0, checklists: false, ..contender.knobs };
     let divisors = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
     let mut knobs = Vec::new();
     match contender.method {
-        Method::One => {
+        Method::One | Method::TemporalOctree => {
             knobs.extend((4..=13).map(|max_depth| TreeKnobs { max_depth, ..base }));
         }
         Method::Two | Method::Four => {
@@ -135,9 +138,23 @@ fn grid(contender: &Contender) -> Vec<TreeKnobs> {
                 knobs.extend([1, 2, 4, 8, 32, 168].map(with));
             }
         }
-        Method::Bsp | Method::LazyGrid | Method::List => knobs.push(base),
+        Method::Irregular => {
+            let with = |capacity| TreeKnobs { capacity, ..base };
+            knobs.extend([4, 8, 16, 32, 64, 128, 256, 512].map(with));
+        }
+        Method::Bsp
+        | Method::LazyGrid
+        | Method::List
+        | Method::RegularGrid
+        | Method::TemporalGrid => knobs.push(base),
     }
-    knobs
+    let shrinks: &[f64] =
+        if contender.loose.shrink == LooseKnobs::default().shrink { &[0.5] } else { &SHRINKS };
+    let all = knobs.into_iter().flat_map(|knobs| {
+        let loose = |&shrink| LooseKnobs { shrink, ..contender.loose };
+        shrinks.iter().map(loose).map(move |loose| Contender { knobs, loose, ..*contender })
+    });
+    all.collect()
 }
 
 /// Tries the knobs of a contender over the first `frames` frames, the best first. One whose depth is reduced
@@ -150,11 +167,11 @@ pub fn tune(
     tick: &mut dyn FnMut(usize) -> bool,
 ) -> Vec<Trial> {
     let course = Course::new(world, frames);
-    let mut try_all = |knobs: Vec<TreeKnobs>| {
-        let count = knobs.len();
+    let mut try_all = |all: Vec<Contender>| {
+        let count = all.len();
         let mut trials = Vec::new();
-        for knobs in knobs {
-            trials.push(course.run(Contender { knobs, ..*contender }));
+        for contender in all {
+            trials.push(course.run(contender));
             if !tick(count) {
                 break;
             }
@@ -174,6 +191,13 @@ pub fn tune(
     if contender.knobs.depth_reduction == 0 {
         return plain;
     }
-    let best = plain.iter().take(BEST_PLAIN).map(|trial| trial.contender.knobs);
-    try_all(best.flat_map(|best| (1..=8).map(move |levels| best.reduced(levels))).collect())
+    let checklists = contender.knobs.checklists;
+    let reduced = |best: Contender| {
+        (1..=8).map(move |depth_reduction| {
+            let knobs = TreeKnobs { depth_reduction, checklists, ..best.knobs };
+            Contender { knobs, ..best }
+        })
+    };
+    let best = plain.iter().take(BEST_PLAIN).map(|trial| trial.contender);
+    try_all(best.flat_map(reduced).collect())
 }

@@ -9,12 +9,15 @@ use proptest::test_runner::{Config, TestRunner};
 
 use crate::common::{ORACLES, SCENES, gate, world};
 
+/// Every culler meets every index on two of the scenes at least, with either proxy; on all of them over the
+/// first two indexes.
 #[test]
 fn every_member_holds_on_every_scene() {
-    for scene in SCENES {
+    for (number, scene) in SCENES.into_iter().enumerate() {
         let (long, short) = (world(scene, 3, 0.02, 4), world(scene, 3, 0.02, 2));
-        for &culler in CULLERS {
-            for (index, oracle, proxy) in pairings() {
+        for (rank, &culler) in CULLERS.iter().enumerate() {
+            let meets = |(place, _): &(usize, _)| *place < 2 || (number + rank + place) % 5 < 2;
+            for (_, (index, oracle, proxy)) in pairings().into_iter().filter(meets) {
                 // A round trip to a device takes its time, and these make thousands in a frame.
                 let slow = ["simple", "full-waits"].contains(&culler.name) && on_device(oracle);
                 let world = if slow { &short } else { &long };
@@ -32,17 +35,17 @@ fn on_device(oracle: &str) -> bool {
 }
 
 /// Every index, oracle and proxy, each with what it bears upon: real devices over the first index
-/// alone, boxes only where they are asked about, hulls on the simulated one.
-fn pairings() -> Vec<(IndexKind, &'static str, ProxyKind)> {
+/// alone, boxes only where they are asked about, hulls on the simulated one. With the place of the index.
+fn pairings() -> Vec<(usize, (IndexKind, &'static str, ProxyKind))> {
     let mut pairings = Vec::new();
     for (place, &index) in INDEXES.iter().enumerate() {
         for oracle in ORACLES.into_iter().filter(|&oracle| place == 0 || oracle == "sim") {
-            pairings.push((index, oracle, ProxyKind::Rectangle));
+            pairings.push((place, (index, oracle, ProxyKind::Rectangle)));
             if ["sim", "hardware"].contains(&oracle) {
-                pairings.push((index, oracle, ProxyKind::Box));
+                pairings.push((place, (index, oracle, ProxyKind::Box)));
             }
             if (place, oracle) == (0, "sim") {
-                pairings.push((index, oracle, ProxyKind::Hull));
+                pairings.push((place, (index, oracle, ProxyKind::Hull)));
             }
         }
     }

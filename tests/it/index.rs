@@ -1,15 +1,21 @@
 //! Every index keeps its promises after every step, and hides nothing from a traversal.
 
 use glam::DVec3;
-use plainsight::cull::{CullerSetup, Item, ProxyKind, Scenery, SceneryKnobs};
-use plainsight::index::{Entry, INDEXES, Index, Moves, NodeId, Work};
+use plainsight::cull::{CULLERS, CullerSetup, Item, ProxyKind, Scenery, SceneryKnobs};
+use plainsight::index::{
+    Entry, GridKnobs, INDEXES, Index, IrregularOctree, LazyGrid, LooseKnobs, Moves, NodeId,
+    RegularGrid, Split, TemporalVolumes, TreeKnobs, Work, bounds_octree, extents_octree,
+    loose_octree, octree, overlapping_octree, radius_octree,
+};
 use plainsight::math::{Aabb, Volume};
 use plainsight::oracle::CostModel;
 use plainsight::part::ObjectId;
 use plainsight::run::{FrameState, Moment};
 use plainsight::scene::{Camera, DepthOrder, Lens, Stream, Viewport};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
 
-use crate::common::world;
+use crate::common::{gate, world};
 
 fn random_box(stream: &mut Stream, reach: f64) -> Aabb {
     let mut point =
@@ -126,53 +132,151 @@ impl Wanderers {
     }
 }
 
+/// What an index did over a crowd.
+#[derive(Default)]
+struct Deeds {
+    found: usize,
+    exact: usize,
+    work: Work,
+}
+
 /// Every structural promise after every step; every object once in a walk, inside its nodes' boxes; and
 /// what is found is what a look at every box finds, or more.
+fn exercise(
+    name: &str,
+    build: &dyn Fn(&[Entry]) -> Box<dyn Index>,
+    crowd: &mut Wanderers,
+    steps: u32,
+) -> Deeds {
+    let mut index = build(&crowd.entries);
+    let all: Vec<ObjectId> = (0..crowd.boxes.len() as u32).map(ObjectId).collect();
+    let mut deeds = Deeds::default();
+    for step in 0..steps {
+        let at = format!("{name} step {step}");
+        let check = |index: &dyn Index, boxes: &[Aabb]| {
+            index.check(boxes).unwrap_or_else(|broken| panic!("{at}: {broken}"));
+        };
+        check(index.as_ref(), &crowd.boxes);
+        let volume = crowd.volume();
+        let (mut found, mut exact) = (Vec::new(), Vec::new());
+        if step % 3 == 0 {
+            index.refine(&crowd.boxes, &volume);
+            check(index.as_ref(), &crowd.boxes);
+        }
+        index.find(&crowd.boxes, &volume, &mut found);
+        check(index.as_ref(), &crowd.boxes);
+        exact.extend(all.iter().filter(|o| volume.touches(&crowd.boxes[o.0 as usize])));
+        found.sort_unstable();
+        assert!(found.is_sorted_by(|a, b| a < b), "{at}: found twice");
+        let missed = exact.iter().find(|id| found.binary_search(id).is_err());
+        assert_eq!(missed, None, "{at}");
+        deeds.found += found.len();
+        deeds.exact += exact.len();
+        let eye = DVec3::splat(crowd.stream.range(-30.0, 30.0));
+        assert_eq!(walk(index.as_ref(), &crowd.boxes, eye), all, "{at}");
+        crowd.step();
+        index.update(crowd.moves());
+    }
+    deeds.work = index.work();
+    deeds
+}
+
 #[test]
 fn invariants_hold_after_every_step() {
     let mut lines = String::new();
     for kind in INDEXES {
-        let (mut found_all, mut exact_all, mut work) = (0, 0, Work::default());
+        let mut all = Deeds::default();
         for (seed, count) in [(1, 0), (2, 1), (3, 2), (4, 50), (5, 300)] {
-            let mut crowd = Wanderers::new(seed, count);
-            let mut index = (kind.build)(&crowd.entries);
-            let all: Vec<ObjectId> = (0..count as u32).map(ObjectId).collect();
-            for step in 0..60 {
-                let at = format!("{} seed {seed} step {step}", kind.name);
-                let check = |index: &dyn Index, boxes: &[Aabb]| {
-                    index.check(boxes).unwrap_or_else(|broken| panic!("{at}: {broken}"));
-                };
-                check(index.as_ref(), &crowd.boxes);
-                let volume = crowd.volume();
-                let (mut found, mut exact) = (Vec::new(), Vec::new());
-                if step % 3 == 0 {
-                    index.refine(&crowd.boxes, &volume);
-                    check(index.as_ref(), &crowd.boxes);
-                }
-                index.find(&crowd.boxes, &volume, &mut found);
-                check(index.as_ref(), &crowd.boxes);
-                exact.extend(all.iter().filter(|o| volume.touches(&crowd.boxes[o.0 as usize])));
-                found.sort_unstable();
-                assert!(found.is_sorted_by(|a, b| a < b), "{at}: found twice");
-                let missed = exact.iter().find(|id| found.binary_search(id).is_err());
-                assert_eq!(missed, None, "{at}");
-                (found_all, exact_all) = (found_all + found.len(), exact_all + exact.len());
-                let eye = DVec3::splat(crowd.stream.range(-30.0, 30.0));
-                assert_eq!(walk(index.as_ref(), &crowd.boxes, eye), all, "{at}");
-                crowd.step();
-                index.update(crowd.moves());
-            }
-            work = work + index.work();
+            let name = format!("{} seed {seed}", kind.name);
+            let these = exercise(&name, &kind.build, &mut Wanderers::new(seed, count), 60);
+            all.found += these.found;
+            all.exact += these.exact;
+            all.work = all.work + these.work;
         }
-        assert!(exact_all > 4000, "{}: {exact_all} in sight", kind.name);
-        let Work { ok, updates, steps, node_checks, object_checks, lowered } = work;
+        assert!(all.exact > 4000, "{}: {} in sight", kind.name, all.exact);
+        let Work { ok, updates, steps, node_checks, object_checks, lowered } = all.work;
         lines += &format!(
-            "{:<22} {found_all:>6} {ok:>6} {updates:>6} {steps:>7} {node_checks:>7} {object_checks:>6} {lowered:>6}\n",
-            kind.name
+            "{:<22} {:>6} {ok:>6} {updates:>6} {steps:>7} {node_checks:>7} {object_checks:>6} {lowered:>6}\n",
+            kind.name, all.found
         );
     }
     let head = "index                   found     ok  moved    steps    nodes objects lowered\n";
     insta::assert_snapshot!("index_work", format!("{head}{lines}"));
+}
+
+/// An index by its place in the family of those that take knobs.
+fn with_knobs(
+    place: usize,
+    knobs: TreeKnobs,
+    loose: LooseKnobs,
+    grid: GridKnobs,
+    entries: &[Entry],
+) -> Box<dyn Index> {
+    match place {
+        0 => octree(entries, knobs),
+        1 => overlapping_octree(entries, knobs),
+        2 => bounds_octree(entries, knobs),
+        3 => extents_octree(entries, knobs),
+        4 => radius_octree(entries, knobs),
+        5 => loose_octree(entries, knobs, loose),
+        6 => Box::new(IrregularOctree::new(entries, knobs)),
+        7 => Box::new(LazyGrid::new(entries, grid)),
+        8 => Box::new(RegularGrid::new(entries, grid)),
+        _ => Box::new(TemporalVolumes::new("volumes", entries, |held| {
+            with_knobs(place % 9, knobs, loose, grid, held)
+        })),
+    }
+}
+
+/// The same with any knobs: depths, divisors, buckets, reductions, checklists, leaves by boxes, other node
+/// sizes, and each of them over temporal bounding volumes.
+#[test]
+fn any_knobs_hold() {
+    let mut runner =
+        TestRunner::new(Config { cases: 240, failure_persistence: None, ..Config::default() });
+    let size = prop::sample::select(vec![0.5, 1.0, 2.0, 6.0, f64::INFINITY]);
+    let tree = (any::<bool>(), 0..9_u8, size, 1..20_u32, 0..6_u8, 0..6_u8, any::<[bool; 2]>());
+    let loose = (prop::sample::select(vec![0.1, 0.5, 0.75, 1.0]), any::<bool>());
+    let all = (0..18_usize, any::<u64>(), 0..120_usize, tree, loose, 0.5..40.0_f64);
+    runner
+        .run(&all, |(place, seed, count, tree, (shrink, largest), per_cell)| {
+            let (flat, max_depth, size_divisor, capacity, start_depth, depth_reduction, [a, b]) =
+                tree;
+            let knobs = TreeKnobs {
+                split: if flat { Split::Quadrants } else { Split::Octants },
+                max_depth,
+                size_divisor,
+                capacity,
+                start_depth,
+                depth_reduction,
+                checklists: a,
+                leaf_boxes: b,
+            };
+            let (loose, grid) = (LooseKnobs { shrink, largest }, GridKnobs { per_cell });
+            let build = |entries: &[Entry]| with_knobs(place, knobs, loose, grid, entries);
+            let name = format!("{place} {knobs:?} {loose:?} {grid:?}");
+            exercise(&name, &build, &mut Wanderers::new(seed, count), 24);
+            Ok(())
+        })
+        .unwrap();
+}
+
+/// The scenes of Wortel 2011 with occlusion: nothing in plain sight is culled over any index.
+#[test]
+fn cullers_hold_over_crowds() {
+    for (scene, scale) in [("city250k", 0.006), ("spheres200k", 0.004)] {
+        let world = world(scene, 1, scale, 6);
+        let culler = *CULLERS.iter().find(|culler| culler.name == "full").unwrap();
+        for &index in INDEXES {
+            let device = ["lazy-grid", "loose-quadtree-lazy"].contains(&index.name);
+            for oracle in if device { &["sim", "hardware"][..] } else { &["sim"] } {
+                let (_, gate) = gate(&world, culler, index, oracle, ProxyKind::Rectangle);
+                let name = format!("{scene} {} {oracle}", index.name);
+                assert!(gate.held(), "{name}: {:?}", gate.failures());
+                assert!(gate.excess.visible() > 0, "{name}: nothing to see");
+            }
+        }
+    }
 }
 
 /// Bounds that a scene gives of its objects' steps and sides hold in every frame.

@@ -6,7 +6,9 @@ use std::process::Command;
 use plainsight::part::PartitionKnobs;
 use plainsight::run::World;
 use plainsight::scene::generate::{Knobs, build};
-use plainsight::survey::{MOST_FOUND, SCENES, SurveyKnobs, Tuned, contenders, survey, tune};
+use plainsight::survey::{
+    MOST_FOUND, SCENES, SurveyKnobs, Tuned, beyond, contenders, survey, tune,
+};
 
 /// Some 6,000 objects.
 fn small(tuned: &Tuned) -> World {
@@ -22,9 +24,13 @@ fn operations_are_as_they_were() {
     let mut lines = String::new();
     for tuned in SCENES {
         let world = small(tuned);
-        for thesis in [true, false] {
-            lines += &format!("{} {}\n", tuned.scene, if thesis { "thesis" } else { "tuned" });
-            for contender in contenders(tuned, thesis) {
+        for (words, all) in [
+            ("thesis", contenders(tuned, true)),
+            ("tuned", contenders(tuned, false)),
+            ("beyond", beyond(tuned)),
+        ] {
+            lines += &format!("{} {words}\n", tuned.scene);
+            for contender in all {
                 let this = survey(&world, &contender, &knobs, &mut || true).unwrap();
                 let work = this.work;
                 lines += &format!(
@@ -96,7 +102,7 @@ fn the_verbs_say_so() {
     let line: serde_json::Value = serde_json::from_str(out.lines().next().unwrap()).unwrap();
     assert_eq!((&line["plainsight"], &line["contender"]), (&"tune".into(), &"1".into()));
     for (args, says) in [
-        (&["tune", "--contender", "5"][..], "there are 1, 2, 3, 3b"),
+        (&["tune", "--contender", "5"][..], "there are 1, 1 DR, 1 LB, 2"),
         (&["compare", "--thesis", "--scene", "rooms"], "the thesis has city250k and spheres200k"),
         (&["compare", "--thesis", "--culler", "full"], "cannot be used with"),
         (&["compare", "--thesis-knobs"], "--thesis"),
