@@ -83,6 +83,13 @@ struct Home {
     due: Due,
 }
 
+/// A cell that is gone through, and the planes that what is in it may be beyond.
+#[derive(Clone, Copy, Debug)]
+struct Visit {
+    cell: u32,
+    planes: Planes,
+}
+
 /// The grids.
 #[derive(Clone, Debug)]
 pub struct LazyGrid {
@@ -257,8 +264,12 @@ impl LazyGrid {
         Some((below, more.map(|bits| 1 << bits), first))
     }
 
-    /// The part of a cell that keeps the point, if one does.
-    fn part_for(&self, cell: u32, at: DVec3) -> Option<u32> {
+    /// The part of a cell that keeps an object of it, if one does, by the middle of its box. That of an empty
+    /// box is not a number, and no part keeps it.
+    fn part_for(&self, id: ObjectId, cell: u32, at: DVec3) -> Option<u32> {
+        if self.deepest[id.0 as usize] <= self.cells[cell as usize].level {
+            return None;
+        }
         let (below, parts, first) = self.parts(cell)?;
         let place = (at - self.space.min) / below.size;
         let along =
@@ -276,17 +287,22 @@ impl LazyGrid {
             if level(to) >= level(from)
                 && let Some(cell) = to
             {
-                let count = &mut self.counts[cell as usize];
-                if *count == 0 {
-                    self.rebuilt.push(NodeId(cell));
-                }
-                *count += 1;
+                self.count_one(cell);
                 to = self.parent_of(cell);
             } else if let Some(cell) = from {
                 self.counts[cell as usize] -= 1;
                 from = self.parent_of(cell);
             }
         }
+    }
+
+    /// Counts an object into one cell.
+    fn count_one(&mut self, cell: u32) {
+        let count = &mut self.counts[cell as usize];
+        if *count == 0 {
+            self.rebuilt.push(NodeId(cell));
+        }
+        *count += 1;
     }
 
     /// Takes the object at a place of its cell's list to another cell.
@@ -356,76 +372,92 @@ impl LazyGrid {
         }
     }
 
-    /// Brings the objects of a cell that is looked at down a level, those that a part of it keeps.
-    fn lower(&mut self, cell: u32, boxes: &[Aabb]) {
-        let level = self.cells[cell as usize].level;
-        if usize::from(level) + 1 == self.levels.len() {
-            return;
-        }
-        let mut objects = std::mem::take(&mut self.cells[cell as usize].objects);
-        let (mut kept, mut next) = (0, 0);
-        while next < objects.len() {
-            let end = objects.len().min(next + READ_AHEAD);
-            let mut middles = [DVec3::ZERO; READ_AHEAD];
-            for (at, &id) in middles.iter_mut().zip(&objects[next..end]) {
-                *at = boxes[id.0 as usize].center();
-            }
-            for place in next..end {
-                let (id, at) = (objects[place], middles[place - next]);
-                // The middle of an empty box is not a number, and no part keeps that.
-                let part = if self.deepest[id.0 as usize] > level {
-                    self.part_for(cell, at)
+    /// Goes through what meets the volume, level by level, and brings it down; `found` is told of objects that
+    /// meet it. All cells of a level are gone through before the next, and all their objects after that: no
+    /// step waits for what another reads from memory.
+    fn walk(&mut self, boxes: &[Aabb], volume: &Volume, found: &mut dyn FnMut(&[ObjectId])) {
+        let mut cells = vec![Visit { cell: 0, planes: Planes::ALL }];
+        let (mut objects, mut parts) = (Vec::new(), Vec::new());
+        for depth in 0..self.levels.len() {
+            self.work.node_checks += cells.len() as u64;
+            let whole = depth > 0 || self.strays.is_empty();
+            cells.retain_mut(|visit| {
+                if visit.planes.is_empty() || !whole {
+                    return true;
+                }
+                let straddled = volume.straddled(&self.loose_box(visit.cell), visit.planes);
+                straddled.is_some_and(|planes| {
+                    visit.planes = planes;
+                    true
+                })
+            });
+            let deepest = depth + 1 == self.levels.len();
+            objects.clear();
+            for visit in &cells {
+                let own = &mut self.cells[visit.cell as usize].objects;
+                if visit.planes.is_empty() {
+                    found(own);
                 } else {
-                    None
-                };
-                if let Some(part) = part {
-                    self.homes[id.0 as usize].cell = part;
-                    self.cells[part as usize].objects.push(id);
-                    self.count(part, Some(cell));
-                    self.work.lowered += 1;
-                    let room = self.room(part, at);
-                    self.schedule(id, room);
-                } else {
-                    objects[kept] = id;
-                    kept += 1;
+                    objects.extend(own.iter().map(|&id| (id, *visit)));
+                    if !deepest {
+                        own.clear();
+                    }
                 }
             }
-            next = end;
+            for batch in objects.chunks(READ_AHEAD) {
+                self.look_closer(batch, boxes, volume, deepest, found);
+            }
+            parts.clear();
+            for visit in &cells {
+                self.each_part(visit.cell, 0, &mut |cell| {
+                    if self.counts[cell as usize] > 0 {
+                        parts.push(Visit { cell, ..*visit });
+                    }
+                });
+            }
+            std::mem::swap(&mut cells, &mut parts);
         }
-        objects.truncate(kept);
-        self.cells[cell as usize].objects = objects;
     }
 
-    /// Goes through what meets the volume and brings it down; `found` is told of objects, and of the planes
-    /// that each may be beyond.
-    fn walk(
+    /// Looks at objects of cells that the volume meets partly, taken out of them unless they are of the
+    /// deepest level: those that a part of their cell keeps go there, the rest back, and `found` is told which
+    /// of these meet the volume.
+    fn look_closer(
         &mut self,
+        batch: &[(ObjectId, Visit)],
         boxes: &[Aabb],
         volume: &Volume,
-        found: &mut dyn FnMut(&[ObjectId], Planes),
+        deepest: bool,
+        found: &mut dyn FnMut(&[ObjectId]),
     ) {
-        let mut stack = vec![(0, Planes::ALL)];
-        while let Some((cell, planes)) = stack.pop() {
-            self.work.node_checks += 1;
-            let planes = if planes.is_empty() || (cell == 0 && !self.strays.is_empty()) {
-                planes
-            } else {
-                match volume.straddled(&self.loose_box(cell), planes) {
-                    Some(planes) => planes,
-                    None => continue,
-                }
-            };
-            if !planes.is_empty() {
-                self.lower(cell, boxes);
-                self.work.object_checks += self.cells[cell as usize].objects.len() as u64;
-            }
-            found(&self.cells[cell as usize].objects, planes);
-            self.each_part(cell, 0, &mut |part| {
-                if self.counts[part as usize] > 0 {
-                    stack.push((part, planes));
-                }
-            });
+        let mut near = [Aabb::EMPTY; READ_AHEAD];
+        for (bounds, (id, _)) in near.iter_mut().zip(batch) {
+            *bounds = boxes[id.0 as usize];
         }
+        let (mut met, mut count) = ([ObjectId(0); READ_AHEAD], 0);
+        for ((id, visit), bounds) in batch.iter().zip(&near) {
+            if !deepest {
+                if let Some(part) = self.part_for(*id, visit.cell, bounds.center()) {
+                    self.lower(*id, part, bounds.center());
+                    continue;
+                }
+                self.cells[visit.cell as usize].objects.push(*id);
+            }
+            self.work.object_checks += 1;
+            met[count] = *id;
+            count += usize::from(volume.touches_planes(bounds, visit.planes));
+        }
+        found(&met[..count]);
+    }
+
+    /// Puts an object that hangs nowhere into a part of the cell that it was in.
+    fn lower(&mut self, id: ObjectId, part: u32, at: DVec3) {
+        self.homes[id.0 as usize].cell = part;
+        self.cells[part as usize].objects.push(id);
+        // The cell and all above count it already.
+        self.count_one(part);
+        self.work.lowered += 1;
+        self.schedule(id, self.room(part, at));
     }
 
     /// Calls `each` with the parts of a cell, those first that are on the side of `nearest`: bit a is set for
@@ -466,29 +498,13 @@ impl Index for LazyGrid {
 
     fn refine(&mut self, boxes: &[Aabb], volume: &Volume) {
         let before = self.work;
-        self.walk(boxes, volume, &mut |_, _| {});
+        self.walk(boxes, volume, &mut |_| {});
         self.work.object_checks = before.object_checks;
     }
 
     /// Exactly what meets the volume.
     fn find(&mut self, boxes: &[Aabb], volume: &Volume, found: &mut Vec<ObjectId>) {
-        self.walk(boxes, volume, &mut |objects, planes| {
-            if planes.is_empty() {
-                found.extend_from_slice(objects);
-                return;
-            }
-            for ids in objects.chunks(READ_AHEAD) {
-                // All of them are read before any is decided on: a decision taken wrongly in advance would
-                // throw the reads away.
-                let mut near = [Aabb::EMPTY; READ_AHEAD];
-                for (bounds, &id) in near.iter_mut().zip(ids) {
-                    *bounds = boxes[id.0 as usize];
-                }
-                let meets =
-                    |(_, bounds): &(&ObjectId, &Aabb)| volume.touches_planes(bounds, planes);
-                found.extend(ids.iter().zip(&near).filter(meets).map(|(&id, _)| id));
-            }
-        });
+        self.walk(boxes, volume, &mut |objects| found.extend_from_slice(objects));
     }
 
     fn work(&self) -> Work {

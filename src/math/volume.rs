@@ -41,26 +41,18 @@ impl Planes {
     }
 }
 
-/// One half-space, its normal parted by sign: of a box, one of the two parts meets the higher coordinate.
-#[derive(Clone, Copy, Debug)]
-struct HalfSpace {
-    positive: DVec3,
-    negative: DVec3,
-    offset: f64,
-}
+/// Planes as they are computed on: of a width that suits vector units, the last two of which nothing is
+/// ever beyond.
+const LANES: usize = 8;
 
-impl HalfSpace {
-    /// For the corner that takes `high` where the normal is positive.
-    fn sum(&self, high: DVec3, low: DVec3) -> f64 {
-        let terms = self.positive * high + self.negative * low;
-        terms.x + terms.y + terms.z + self.offset
-    }
-}
-
-/// Six half-spaces. A point p is inside where `normal · p + offset ≥ 0` for all.
+/// Six half-spaces. A point p is inside where `normal · p + offset ≥ 0` for all. Plane by plane beside one
+/// another, so that all are asked at once: what a branch for each would cost is more than their sums.
 #[derive(Clone, Copy, Debug)]
 pub struct Volume {
-    half_spaces: [HalfSpace; PLANES],
+    /// Normals by axis, parted by sign: of a box, one of the two parts meets the higher coordinate.
+    positive: [[f64; LANES]; 3],
+    negative: [[f64; LANES]; 3],
+    offset: [f64; LANES],
 }
 
 impl Volume {
@@ -73,13 +65,33 @@ impl Volume {
             DepthOrder::Forward => [z, w - z],
             DepthOrder::Reversed => [z + w, -z],
         };
-        let planes = [w + x, w - x, w + y, w - y, near, far];
-        let half_space = |plane: DVec4| {
-            let normal = plane.truncate();
-            let (positive, negative) = (normal.max(DVec3::ZERO), normal.min(DVec3::ZERO));
-            HalfSpace { positive, negative, offset: plane.w }
+        let planes: [DVec4; PLANES] = [w + x, w - x, w + y, w - y, near, far];
+        let lanes = |value: &dyn Fn(DVec4) -> f64| {
+            std::array::from_fn(|lane| planes.get(lane).map_or(0.0, |&plane| value(plane)))
         };
-        Self { half_spaces: planes.map(half_space) }
+        let by_axis = |value: fn(f64, f64) -> f64| {
+            std::array::from_fn(|axis| lanes(&|plane| value(plane[axis], 0.0)))
+        };
+        Self {
+            positive: by_axis(f64::max),
+            negative: by_axis(f64::min),
+            offset: lanes(&|plane| plane.w),
+        }
+    }
+
+    /// By plane, the sum for the corner that takes `high` where the normal is positive.
+    fn sums(&self, high: DVec3, low: DVec3) -> [f64; LANES] {
+        let term = |axis: usize, lane: usize| {
+            self.positive[axis][lane] * high[axis] + self.negative[axis][lane] * low[axis]
+        };
+        std::array::from_fn(|lane| {
+            term(0, lane) + term(1, lane) + term(2, lane) + self.offset[lane]
+        })
+    }
+
+    /// The planes that the box is wholly beyond.
+    fn beyond(&self, aabb: &Aabb) -> u8 {
+        bits(self.sums(aabb.max, aabb.min).map(|sum| sum < 0.0))
     }
 
     /// What a box has of it. The empty box is outside; one with a side that is not a number meets it
@@ -96,22 +108,12 @@ impl Volume {
     /// Of some planes, those that a box is not wholly inside of; `None` where it is beyond one of them.
     #[must_use]
     pub fn straddled(&self, aabb: &Aabb, planes: Planes) -> Option<Planes> {
-        if is_empty(aabb) {
+        if is_empty(aabb) || self.beyond(aabb) & planes.0 != 0 {
             return None;
         }
-        let (mut left, mut straddled) = (planes.0, 0);
-        while left != 0 {
-            let plane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let half_space = &self.half_spaces[plane];
-            if half_space.sum(aabb.max, aabb.min) < 0.0 {
-                return None;
-            }
-            // A sum that is not a number decides nothing.
-            let inside = half_space.sum(aabb.min, aabb.max) >= 0.0;
-            straddled |= u8::from(!inside) << plane;
-        }
-        Some(Planes(straddled))
+        // A sum that is not a number decides nothing.
+        let inside = bits(self.sums(aabb.min, aabb.max).map(|sum| sum >= 0.0));
+        Some(Planes(planes.0 & !inside))
     }
 
     /// Whether a box is not wholly beyond one of the planes.
@@ -123,19 +125,13 @@ impl Volume {
     /// The same of some planes.
     #[must_use]
     pub fn touches_planes(&self, aabb: &Aabb, planes: Planes) -> bool {
-        if is_empty(aabb) {
-            return false;
-        }
-        let mut left = planes.0;
-        while left != 0 {
-            let plane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            if self.half_spaces[plane].sum(aabb.max, aabb.min) < 0.0 {
-                return false;
-            }
-        }
-        true
+        !is_empty(aabb) & (self.beyond(aabb) & planes.0 == 0)
     }
+}
+
+/// Bit by lane.
+fn bits(lanes: [bool; LANES]) -> u8 {
+    (0..).zip(lanes).fold(0, |bits, (lane, set)| bits | u8::from(set) << lane)
 }
 
 /// Whether a box certainly holds nothing; what is not a number says nothing.
