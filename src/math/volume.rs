@@ -41,18 +41,14 @@ impl Planes {
     }
 }
 
-/// Planes as they are computed on: of a width that suits vector units, the last two of which nothing is
-/// ever beyond.
-const LANES: usize = 8;
-
 /// Six half-spaces. A point p is inside where `normal · p + offset ≥ 0` for all. Plane by plane beside one
 /// another, so that all are asked at once: what a branch for each would cost is more than their sums.
 #[derive(Clone, Copy, Debug)]
 pub struct Volume {
     /// Normals by axis, parted by sign: of a box, one of the two parts meets the higher coordinate.
-    positive: [[f64; LANES]; 3],
-    negative: [[f64; LANES]; 3],
-    offset: [f64; LANES],
+    positive: [[f64; PLANES]; 3],
+    negative: [[f64; PLANES]; 3],
+    offset: [f64; PLANES],
 }
 
 impl Volume {
@@ -66,21 +62,19 @@ impl Volume {
             DepthOrder::Reversed => [z + w, -z],
         };
         let planes: [DVec4; PLANES] = [w + x, w - x, w + y, w - y, near, far];
-        let lanes = |value: &dyn Fn(DVec4) -> f64| {
-            std::array::from_fn(|lane| planes.get(lane).map_or(0.0, |&plane| value(plane)))
-        };
-        let by_axis = |value: fn(f64, f64) -> f64| {
-            std::array::from_fn(|axis| lanes(&|plane| value(plane[axis], 0.0)))
+        let by_axis = |part: fn(f64, f64) -> f64| {
+            std::array::from_fn(|axis| planes.map(|plane| part(plane[axis], 0.0)))
         };
         Self {
             positive: by_axis(f64::max),
             negative: by_axis(f64::min),
-            offset: lanes(&|plane| plane.w),
+            offset: planes.map(|plane| plane.w),
         }
     }
 
     /// By plane, the sum for the corner that takes `high` where the normal is positive.
-    fn sums(&self, high: DVec3, low: DVec3) -> [f64; LANES] {
+    #[inline]
+    fn sums(&self, high: DVec3, low: DVec3) -> [f64; PLANES] {
         let term = |axis: usize, lane: usize| {
             self.positive[axis][lane] * high[axis] + self.negative[axis][lane] * low[axis]
         };
@@ -90,6 +84,7 @@ impl Volume {
     }
 
     /// The planes that the box is wholly beyond.
+    #[inline]
     fn beyond(&self, aabb: &Aabb) -> u8 {
         bits(self.sums(aabb.max, aabb.min).map(|sum| sum < 0.0))
     }
@@ -123,6 +118,7 @@ impl Volume {
     }
 
     /// The same of some planes.
+    #[inline]
     #[must_use]
     pub fn touches_planes(&self, aabb: &Aabb, planes: Planes) -> bool {
         !is_empty(aabb) & (self.beyond(aabb) & planes.0 == 0)
@@ -130,7 +126,7 @@ impl Volume {
 }
 
 /// Bit by lane.
-fn bits(lanes: [bool; LANES]) -> u8 {
+fn bits(lanes: [bool; PLANES]) -> u8 {
     (0..).zip(lanes).fold(0, |bits, (lane, set)| bits | u8::from(set) << lane)
 }
 
