@@ -133,7 +133,6 @@ pub const SOUND: &[Rig] =
 pub const OTHERS: &[(u8, &str)] = &[
     (9, "orthographic camera: hard/orthographic"),
     (20, "scale changed at run time: awaits an effect that scales"),
-    (21, "animated mesh keeps its rest box: awaits articulated motion"),
     (26, "wide cones: hard/wide-angle; cones themselves await a culler that uses them"),
     (28, "T-junctions against the device's coverage: hard/t-junctions"),
     (30, "alpha-tested or transparent occluders: awaits materials"),

@@ -97,12 +97,27 @@ fn first_eye(view: &View<'_>, shown: &mut Shown, memory: &mut Memory) {
     shown.under(memory.first_view.unwrap_or(view.clip_from_world));
 }
 
-fn old_boxes(view: &View<'_>, shown: &mut Shown, memory: &mut Memory) {
+/// Notes where objects are in frame 0.
+fn remember(view: &View<'_>, memory: &mut Memory) {
     let world = view.clip_from_world.inverse();
     if view.frame == 0 {
         memory.world_from_object =
             view.objects.iter().map(|object| world * object.clip_from_object).collect();
     }
+}
+
+/// Things are where they are, in the pose that they had at first.
+fn rest_pose(view: &View<'_>, shown: &mut Shown, memory: &mut Memory) {
+    remember(view, memory);
+    let world = view.clip_from_world.inverse();
+    for (object, rest) in shown.objects.iter_mut().zip(&memory.world_from_object) {
+        let w_axis = (world * object.clip_from_object).w_axis;
+        object.clip_from_object = view.clip_from_world * DMat4 { w_axis, ..*rest };
+    }
+}
+
+fn old_boxes(view: &View<'_>, shown: &mut Shown, memory: &mut Memory) {
+    remember(view, memory);
     for (object, then) in shown.objects.iter_mut().zip(&memory.world_from_object) {
         object.clip_from_object = view.clip_from_world * *then;
     }
@@ -144,6 +159,12 @@ pub(super) const FAULTS: &[Fault] = &[
         "half the field of view is halved again",
         &["hard/orthographic", "hard/wide-angle", "hard/near-plane"],
         (history::VFC, Rig { culler: |setup| vfc(setup, half_of_half), ..history::VFC }),
+    ),
+    Fault::drops(
+        ("rest-pose", 21),
+        "an animated mesh keeps the box of its first pose, wherever it goes",
+        &["hard/orthographic", "hard/pivots"],
+        (history::FULL, Rig { culler: |setup| full(setup, rest_pose), ..history::FULL }),
     ),
     Fault::drops(
         ("old-boxes", 22),

@@ -234,42 +234,45 @@ const LARGEST: LooseKnobs = LooseKnobs { shrink: 0.5, largest: true };
 
 fn beyond_city() -> Vec<Contender> {
     let split = Split::Quadrants;
-    let (one, two) = (with(split, 9), divided(split, 9, 3.0));
-    let (radius, loose) = (bucket(split, 8, 8), divided(split, 10, 4.0));
     let slow = LooseKnobs { shrink: 0.6, largest: false };
-    vec![
-        of("1 DR", Method::One, higher(one, 3)),
-        of("1 LB", Method::One, leaves(one)),
-        of("2 DR", Method::Two, higher(two, 3)),
-        of("2 LB", Method::Two, leaves(two)),
-        of("3bR LB", Method::ThreeBR, leaves(radius)),
-        four("4 sizes", loose, slow),
-        four("4 largest", loose, LARGEST),
-        of("irregular", Method::Irregular, bucket(split, 32, 0)),
-        of("regular grid", Method::RegularGrid, loose),
-        of("TBV grid", Method::TemporalGrid, loose),
-        of("TBV 1", Method::TemporalOctree, one),
-    ]
+    let mut all = vec![
+        of("1 DR", Method::One, higher(with(split, 9), 8)),
+        of("1 LB", Method::One, leaves(with(split, 9))),
+        of("2 DR", Method::Two, higher(divided(split, 9, 4.0), 3)),
+        of("2 LB", Method::Two, leaves(divided(split, 9, 3.0))),
+        of("3bR LB", Method::ThreeBR, leaves(bucket(split, 8, 8))),
+        four("4 sizes", divided(split, 10, 8.0), slow),
+        four("4 largest", divided(split, 9, 3.0), LARGEST),
+    ];
+    all.extend(related(split, 16));
+    all
 }
 
 fn beyond_spheres() -> Vec<Contender> {
     let split = Split::Octants;
-    let (one, two) = (with(split, 6), divided(split, 9, 1.0));
-    let (radius, loose) = (bucket(split, 4, 7), divided(split, 7, 2.0));
     let slow = LooseKnobs { shrink: 0.6, largest: false };
-    vec![
-        of("1 DR", Method::One, higher(one, 3)),
-        of("1 LB", Method::One, leaves(one)),
-        of("2 DR", Method::Two, higher(two, 3)),
-        of("2 LB", Method::Two, leaves(two)),
+    let mut all = vec![
+        of("1 DR", Method::One, higher(with(split, 6), 6)),
+        of("1 LB", Method::One, leaves(with(split, 6))),
+        of("2 DR", Method::Two, higher(divided(split, 10, 1.0), 1)),
+        of("2 LB", Method::Two, leaves(divided(split, 7, 1.0))),
         of("3 LB", Method::Three, leaves(bucket(split, 8, 6))),
-        of("3b LB", Method::ThreeB, leaves(bucket(split, 4, 7))),
-        of("3bR LB", Method::ThreeBR, leaves(radius)),
-        four("4 sizes", loose, slow),
-        four("4 largest", loose, LARGEST),
-        of("irregular", Method::Irregular, bucket(split, 32, 0)),
-        of("regular grid", Method::RegularGrid, loose),
-        of("TBV grid", Method::TemporalGrid, loose),
-        of("TBV 1", Method::TemporalOctree, one),
+        of("3b LB", Method::ThreeB, leaves(bucket(split, 1, 6))),
+        of("3bR LB", Method::ThreeBR, leaves(bucket(split, 1, 6))),
+        four("4 sizes", divided(split, 7, 6.0), slow),
+        four("4 largest", divided(split, 7, 2.0), LARGEST),
+    ];
+    all.extend(related(split, 4));
+    all
+}
+
+/// The indexes of the related work; the irregular tree parts nodes with more objects than `capacity`.
+fn related(split: Split, capacity: u32) -> [Contender; 4] {
+    let knobs = TreeKnobs::usual(split, 0);
+    [
+        of("irregular", Method::Irregular, bucket(split, capacity, 0)),
+        of("regular grid", Method::RegularGrid, knobs),
+        of("TBV grid", Method::TemporalGrid, knobs),
+        of("TBV 1", Method::TemporalOctree, with(split, 4)),
     ]
 }

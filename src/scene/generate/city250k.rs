@@ -11,12 +11,11 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::Chosen;
 use super::shape::Builder;
-use crate::math::{cos, sin};
+use super::{Chosen, straight_while_turning};
 use crate::scene::{
-    Articulated, CameraPath, CameraPose, Effects, Figure, Joint, Lens, Limb, Mesh, Motion, Object,
-    Path, Placement, Scene, SceneError, Stream, Travel,
+    Articulated, Effects, Figure, Joint, Limb, Mesh, Motion, Object, Path, Placement, Scene,
+    SceneError, Stream,
 };
 
 /// Blocks along a side at scale 1.
@@ -66,12 +65,18 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         city.block((at + DVec3::new(0.5, 0.0, 0.5)) * PITCH);
     }
     let City { objects, movers, figures, .. } = city;
+    let street = f64::from(blocks / 2) * PITCH * DVec3::new(1.0, 0.0, 1.0);
     Ok(Scene {
         name: "city250k".to_owned(),
         seed: chosen.seed,
         meshes,
         objects,
-        cameras: vec![walk(chosen, blocks)],
+        cameras: vec![straight_while_turning(
+            chosen,
+            street + DVec3::new(3.0, 1.7, 0.0),
+            0.0,
+            DISTANCE,
+        )],
         viewport: chosen.viewport,
         depth: chosen.depth,
         leaf_triangles: chosen.leaf_triangles,
@@ -213,28 +218,6 @@ impl Walker {
         let pace = speed.abs() / 1.4 * std::f64::consts::TAU;
         let phase = stream.range(0.0, std::f64::consts::TAU);
         Figure { path, start: DVec3::ZERO, pace, phase, limbs }
-    }
-}
-
-/// Along a street near the middle, a sixth of a turn in a hundred frames.
-fn walk(chosen: &Chosen, blocks: u32) -> CameraPath {
-    const POSES: u32 = 24;
-    let street = f64::from(blocks / 2) * PITCH;
-    let length = f64::from(chosen.frames) * 0.1;
-    let pose = |i: u32| {
-        let part = f64::from(i) / f64::from(POSES);
-        let eye = DVec3::new(street + 3.0 + length * part, 1.7, street);
-        let turn = 0.3 + length * part * 0.1;
-        let target = eye + DVec3::new(cos(turn), 0.0, sin(turn)) * 10.0;
-        CameraPose { eye, target }
-    };
-    CameraPath {
-        poses: (0..=POSES).map(pose).collect(),
-        duration: chosen.frames,
-        travel: Travel::Glide,
-        lens: Lens::perspective(1.0),
-        near: 0.1,
-        far: DISTANCE,
     }
 }
 

@@ -15,7 +15,13 @@ mod swarm;
 
 use std::path::PathBuf;
 
-use super::{DepthOrder, LEAF_TRIANGLES, Scene, SceneError, Viewport, file};
+use glam::DVec3;
+
+use super::{
+    CameraPath, CameraPose, DepthOrder, LEAF_TRIANGLES, Lens, Scene, SceneError, Travel, Viewport,
+    file,
+};
+use crate::math::{cos, sin};
 
 pub use hard::HARD;
 pub use shape::blob;
@@ -114,6 +120,27 @@ pub struct Generator {
     /// Most triangles in a part where no number is asked for.
     pub leaf_triangles: u32,
     build: fn(&Chosen) -> Result<Scene, SceneError>,
+}
+
+/// A camera that goes straight along x while it turns, a tenth of a unit and a hundredth of a radian in a
+/// frame (Wortel 2011, section 4.2). It looks up by `rise` in ten.
+fn straight_while_turning(chosen: &Chosen, from: DVec3, rise: f64, far: f64) -> CameraPath {
+    const POSES: u32 = 24;
+    let length = f64::from(chosen.frames) * 0.1;
+    let pose = |i: u32| {
+        let way = length * f64::from(i) / f64::from(POSES);
+        let eye = from + DVec3::X * way;
+        let turn = 0.3 + way * 0.1;
+        CameraPose { eye, target: eye + DVec3::new(cos(turn), rise, sin(turn)) * 10.0 }
+    };
+    CameraPath {
+        poses: (0..=POSES).map(pose).collect(),
+        duration: chosen.frames,
+        travel: Travel::Glide,
+        lens: Lens::perspective(1.0),
+        near: 0.1,
+        far,
+    }
 }
 
 /// What most generators have in common; also the defaults of an inline scene file.

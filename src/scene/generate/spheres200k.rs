@@ -9,13 +9,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::Chosen;
 use super::shape::Builder;
+use super::{Chosen, straight_while_turning};
 use crate::math::{cos, sin};
-use crate::scene::{
-    CameraPath, CameraPose, Effects, Lens, Mesh, Motion, Object, Path, Placement, Scene,
-    SceneError, Stream, Travel,
-};
+use crate::scene::{Effects, Mesh, Motion, Object, Path, Placement, Scene, SceneError, Stream};
 
 /// Spheres at scale 1.
 const COUNT: f64 = 200_000.0;
@@ -59,7 +56,7 @@ pub(super) fn build(chosen: &Chosen) -> Result<Scene, SceneError> {
         seed: chosen.seed,
         meshes: vec![Arc::new(sphere())],
         objects,
-        cameras: vec![flight(chosen)],
+        cameras: vec![straight_while_turning(chosen, DVec3::new(1.0, 0.5, 0.5), 0.1, DISTANCE)],
         viewport: chosen.viewport,
         depth: chosen.depth,
         leaf_triangles: chosen.leaf_triangles,
@@ -80,25 +77,4 @@ fn sphere() -> Mesh {
     let mut mesh = Builder::default();
     mesh.lathe(DVec3::ZERO, &profile, 8);
     mesh.finish("sphere")
-}
-
-/// Straight ahead from near the middle, turning as it goes.
-fn flight(chosen: &Chosen) -> CameraPath {
-    const POSES: u32 = 24;
-    let length = f64::from(chosen.frames) * 0.1;
-    let pose = |i: u32| {
-        let part = f64::from(i) / f64::from(POSES);
-        let eye = DVec3::new(1.0 + length * part, 0.5, 0.5);
-        let turn = 0.3 + length * part * 0.1;
-        let target = eye + DVec3::new(cos(turn), 0.1, sin(turn)) * 10.0;
-        CameraPose { eye, target }
-    };
-    CameraPath {
-        poses: (0..=POSES).map(pose).collect(),
-        duration: chosen.frames,
-        travel: Travel::Glide,
-        lens: Lens::perspective(1.0),
-        near: 0.1,
-        far: DISTANCE,
-    }
 }
