@@ -40,6 +40,12 @@ struct Fellow {
     met: bool,
 }
 
+/// What is added to the half side of a volume around a middle that is so far from the origin: the roundings
+/// of the middle, wherever it goes within the volume, and of the volume's corners.
+fn rounding(far: f64, half: f64) -> f64 {
+    (far + 2.0 * half) * MIDDLE_ROUNDING
+}
+
 /// An index over volumes.
 pub struct TemporalVolumes {
     name: &'static str,
@@ -84,12 +90,15 @@ impl TemporalVolumes {
         for (id, entry) in (0..).map(ObjectId).zip(entries) {
             all.renew(id, &entry.bounds);
         }
-        let held = |(entry, &bounds): (&Entry, &Aabb)| Entry {
-            bounds,
-            step_bound: entry.step_bound * f64::from(LONGEST),
-            reach: entry.reach + entry.step_bound * f64::from(LONGEST),
+        let whole = all.volumes.iter().fold(Aabb::EMPTY, |whole, one| whole.union(one));
+        let far = if whole.is_empty() { 0.0 } else { whole.max_abs().max_element() };
+        let held = |(fellow, &bounds): (&Fellow, &Aabb)| {
+            let way = f64::from(fellow.step) * f64::from(LONGEST);
+            let half = f64::from(fellow.reach) + way;
+            // With the rounding of a volume that is anywhere within its index, half a space around included.
+            Entry { bounds, step_bound: way, reach: half + rounding(2.0 * far, half) }
         };
-        let held: Vec<Entry> = entries.iter().zip(&all.volumes).map(held).collect();
+        let held: Vec<Entry> = all.fellows.iter().zip(&all.volumes).map(held).collect();
         all.within = build(&held);
         all
     }
@@ -106,9 +115,8 @@ impl TemporalVolumes {
         let (step, at) = (f64::from(fellow.step), bounds.center());
         let way = step * f64::from(fellow.life);
         let half = f64::from(fellow.reach) + way;
-        // The middle's own rounding, at its farthest.
-        let rounding = (at.abs().max_element() + 2.0 * half) * MIDDLE_ROUNDING;
-        self.volumes[id.0 as usize] = Aabb::new(at, at).grown(DVec3::splat(half + rounding));
+        let half = half + rounding(at.abs().max_element(), half);
+        self.volumes[id.0 as usize] = Aabb::new(at, at).grown(DVec3::splat(half));
         self.lists.put(id, &mut fellow.due, way, step);
     }
 

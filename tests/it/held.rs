@@ -18,8 +18,12 @@ fn every_member_holds_on_every_scene() {
         for (rank, &culler) in CULLERS.iter().enumerate() {
             let meets = |(place, _): &(usize, _)| *place < 2 || (number + rank + place) % 5 < 2;
             for (_, (index, oracle, proxy)) in pairings().into_iter().filter(meets) {
-                // A round trip to a device takes its time, and these make thousands in a frame.
+                // A round trip to a device takes its time, and these make thousands in a frame: on two of
+                // the scenes; the hard ones are gone through on the real device all the same.
                 let slow = ["simple", "full-waits"].contains(&culler.name) && on_device(oracle);
+                if slow && (number + rank) % 5 >= 2 {
+                    continue;
+                }
                 let world = if slow { &short } else { &long };
                 let (_, gate) = gate(world, culler, index, oracle, proxy);
                 let name = format!("{scene} {} {} {oracle} {proxy:?}", culler.name, index.name);
