@@ -16,7 +16,7 @@ use std::borrow::Cow;
 
 use glam::DVec3;
 
-use super::{Entry, Index, Moves, Node, NodeId, TreeKnobs, Work};
+use super::{Entry, Index, Moves, Node, NodeId, TreeKnobs, Work, each_once, space_of_boxes};
 use crate::math::{Aabb, Planes, Volume};
 use crate::part::ObjectId;
 
@@ -62,8 +62,7 @@ impl IrregularOctree {
     /// depth.
     #[must_use]
     pub fn new(entries: &[Entry], knobs: TreeKnobs) -> Self {
-        let space = entries.iter().fold(Aabb::EMPTY, |all, entry| all.union(&entry.bounds));
-        let space = if space.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ZERO) } else { space };
+        let space = space_of_boxes(entries);
         let home = |place| Home { node: 0, place, stray: false };
         let mut tree = Self {
             knobs,
@@ -120,12 +119,7 @@ impl IrregularOctree {
     }
 
     fn child_space(&self, node: u32, split: DVec3, octant: usize) -> Aabb {
-        let mut space = self.nodes[node as usize].space;
-        for (bit, &axis) in self.knobs.split.axes().iter().enumerate() {
-            let end = if octant >> bit & 1 == 1 { &mut space.min } else { &mut space.max };
-            end[axis] = split[axis];
-        }
-        space
+        self.knobs.split.part(&self.nodes[node as usize].space, split, octant)
     }
 
     /// What may go below a node: no empty box, and none that sticks out of the root.
@@ -356,8 +350,7 @@ impl Index for IrregularOctree {
     fn children(&self, node: NodeId, eye: DVec3, out: &mut Vec<NodeId>) -> usize {
         let IrregularNode { split, children, .. } = &self.nodes[node.0 as usize];
         let Some(split) = *split else { return 0 };
-        let bit = |(bit, &axis): (usize, &usize)| usize::from(eye[axis] >= split[axis]) << bit;
-        let nearest: usize = self.knobs.split.axes().iter().enumerate().map(bit).sum();
+        let nearest = self.knobs.split.octant(split, eye);
         let before = out.len();
         let order = (0..children.len()).map(|i| children[nearest ^ i]);
         out.extend(order.filter(|&child| child != NONE).map(NodeId));
@@ -376,10 +369,7 @@ impl Index for IrregularOctree {
         }
         let mut seen = vec![0_u32; boxes.len()];
         order.iter().try_for_each(|node| self.check_node(node.0, boxes, &mut seen))?;
-        match seen.iter().position(|&times| times != 1) {
-            Some(object) => Err(format!("object {object} hangs at {} nodes", seen[object])),
-            None => Ok(()),
-        }
+        each_once(&seen)
     }
 }
 

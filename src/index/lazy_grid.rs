@@ -6,8 +6,8 @@
 //!
 //! 1. **Borders with slack.** A cell keeps an object while its middle is within a quarter of a cell
 //!    of the cell ([`SLACK`]). One that is looked at and is in the outer half of that goes to the cell that
-//!    its middle is in, where every border is a quarter of a cell away again: nobody is looked at in frame after frame for being near a
-//!    border.
+//!    its middle is in, where every border is a quarter of a cell away again: nobody is looked at in frame
+//!    after frame for being near a border.
 //! 2. **Back up in one go.** It goes [`CLIMB`] levels up, to where it need not be looked at for long;
 //!    finding brings it down where that is needed. So what is far from the view comes to lie in ever larger
 //!    cells, and a scene may grow beyond the view at little cost.
@@ -24,7 +24,10 @@ use std::borrow::Cow;
 use glam::DVec3;
 
 use super::checklist::{Checklists, Due};
-use super::{Entry, Index, MIDDLE_ROUNDING, Moves, Node, NodeId, Work, rounded_up};
+use super::{
+    Entry, GridKnobs, Index, MIDDLE_ROUNDING, Moves, Node, NodeId, Work, each_once, rounded_up,
+    space_of_middles,
+};
 use crate::math::{Aabb, Planes, Volume};
 use crate::part::ObjectId;
 
@@ -40,18 +43,6 @@ const FIRST: u8 = 3;
 const AHEAD: u32 = 4096;
 /// Objects that are due whose memory is read ahead of the decisions, so that the reads overlap.
 const READ_AHEAD: usize = 32;
-/// The knob of the grid.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GridKnobs {
-    /// Objects in a cell of the deepest level, were they spread evenly; above 0.
-    pub per_cell: f64,
-}
-
-impl Default for GridKnobs {
-    fn default() -> Self {
-        Self { per_cell: 12.0 }
-    }
-}
 
 /// One grid.
 #[derive(Clone, Copy, Debug)]
@@ -112,11 +103,8 @@ impl LazyGrid {
     /// Over the boxes of frame 0.
     #[must_use]
     pub fn new(entries: &[Entry], knobs: GridKnobs) -> Self {
-        let full = || entries.iter().filter(|entry| !entry.bounds.is_empty());
-        // Over the middles: what sticks out is the cells' slack.
-        let middles = full().map(|entry| entry.bounds.center());
-        let space = middles.fold(Aabb::EMPTY, |all, at| all.union(&Aabb::new(at, at)));
-        let space = if space.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ZERO) } else { space };
+        // What sticks out is the cells' slack.
+        let space = space_of_middles(entries);
         let longest = space.size().max_element().max(f64::MIN_POSITIVE);
         let far = space.max_abs().max_element() + longest;
         let (mut levels, mut count): (Vec<Level>, u32) = (Vec::new(), 0);
@@ -594,9 +582,6 @@ impl Index for LazyGrid {
                 }
             }
         }
-        match seen.iter().position(|&times| times != 1) {
-            Some(object) => Err(format!("object {object} lies in {} cells", seen[object])),
-            None => Ok(()),
-        }
+        each_once(&seen)
     }
 }

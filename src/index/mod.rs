@@ -4,6 +4,7 @@
 
 mod bucket_octree;
 mod checklist;
+mod grid_knobs;
 mod irregular_octree;
 mod lazy_grid;
 mod list;
@@ -24,8 +25,9 @@ use crate::math::{Aabb, Meets, Volume};
 use crate::part::ObjectId;
 
 pub use bucket_octree::{bounds_octree, extents_octree, radius_octree};
+pub use grid_knobs::GridKnobs;
 pub use irregular_octree::IrregularOctree;
-pub use lazy_grid::{GridKnobs, LazyGrid};
+pub use lazy_grid::LazyGrid;
 pub use list::List;
 pub use loose_octree::{LooseKnobs, loose_octree};
 pub use octree::{octree, overlapping_octree};
@@ -87,6 +89,30 @@ const MIDDLE_ROUNDING: f64 = 1.0 / (1_u64 << 49) as f64;
 fn rounded_up(value: f64) -> f32 {
     let near = value as f32;
     if f64::from(near) < value { near.next_up() } else { near }
+}
+
+/// The box of all boxes; a point where there is nothing.
+fn space_of_boxes(entries: &[Entry]) -> Aabb {
+    whole(entries.iter().map(|entry| entry.bounds))
+}
+
+/// The box of the middles of all boxes; a point where there is nothing.
+fn space_of_middles(entries: &[Entry]) -> Aabb {
+    let full = entries.iter().filter(|entry| !entry.bounds.is_empty());
+    whole(full.map(|entry| entry.bounds.center()).map(|at| Aabb::new(at, at)))
+}
+
+fn whole(boxes: impl Iterator<Item = Aabb>) -> Aabb {
+    let space = boxes.fold(Aabb::EMPTY, |all, one| all.union(&one));
+    if space.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ZERO) } else { space }
+}
+
+/// Whether every object was seen once, by how often each was.
+fn each_once(seen: &[u32]) -> Result<(), String> {
+    match seen.iter().position(|&times| times != 1) {
+        Some(object) => Err(format!("object {object} hangs at {} nodes", seen[object])),
+        None => Ok(()),
+    }
 }
 
 /// Operations of an index, in the words of Wortel 2011, section 4.1. The same for the same moves and

@@ -15,7 +15,7 @@ use std::borrow::Cow;
 
 use glam::DVec3;
 
-use super::{Entry, GridKnobs, Index, Moves, Node, NodeId, Work};
+use super::{Entry, GridKnobs, Index, Moves, Node, NodeId, Work, each_once, space_of_middles};
 use crate::math::{Aabb, Planes, Volume};
 use crate::part::ObjectId;
 
@@ -51,10 +51,7 @@ impl RegularGrid {
     /// Over the boxes of frame 0.
     #[must_use]
     pub fn new(entries: &[Entry], knobs: GridKnobs) -> Self {
-        let full = || entries.iter().filter(|entry| !entry.bounds.is_empty());
-        let middles = full().map(|entry| entry.bounds.center());
-        let space = middles.fold(Aabb::EMPTY, |all, at| all.union(&Aabb::new(at, at)));
-        let space = if space.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ZERO) } else { space };
+        let space = space_of_middles(entries);
         // The longest side of a cell is halved until there are enough.
         let (mut size, mut counts, mut bits) = (space.size(), [1_u32; 3], 0);
         while f64::from(1_u32 << bits) * knobs.per_cell < entries.len() as f64
@@ -252,9 +249,6 @@ impl Index for RegularGrid {
                 }
             }
         }
-        match seen.iter().position(|&times| times != 1) {
-            Some(object) => Err(format!("object {object} lies in {} cells", seen[object])),
-            None => Ok(()),
-        }
+        each_once(&seen)
     }
 }

@@ -19,7 +19,7 @@ use glam::DVec3;
 
 use super::checklist::{Checklists, Due};
 use super::tree_knobs::{Split, TreeKnobs};
-use super::{Entry, Index, Moves, Node, NodeId, Work, rounded_up};
+use super::{Entry, Index, Moves, Node, NodeId, Work, each_once, rounded_up, space_of_boxes};
 use crate::math::{Aabb, Planes, Volume};
 use crate::part::ObjectId;
 
@@ -145,8 +145,7 @@ impl Home {
 impl<R: Rules> Tree<R> {
     /// Over the boxes of frame 0.
     pub(super) fn new(entries: &[Entry], knobs: TreeKnobs, rules: impl FnOnce(&Aabb) -> R) -> Self {
-        let space = entries.iter().fold(Aabb::EMPTY, |all, entry| all.union(&entry.bounds));
-        let space = if space.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ZERO) } else { space };
+        let space = space_of_boxes(entries);
         let space = match knobs.split {
             Split::Octants => space,
             Split::Quadrants => headroom(&space),
@@ -213,19 +212,12 @@ impl<R: Rules> Tree<R> {
 
     /// In which octant of the node the point is.
     fn octant(&self, node: u32, at: DVec3) -> usize {
-        let middle = self.nodes[node as usize].space.center();
-        let bit = |(bit, &axis): (usize, &usize)| usize::from(at[axis] >= middle[axis]) << bit;
-        self.knobs.split.axes().iter().enumerate().map(bit).sum()
+        self.knobs.split.octant(self.nodes[node as usize].space.center(), at)
     }
 
     fn child_space(&self, node: u32, octant: usize) -> Aabb {
-        let mut space = self.nodes[node as usize].space;
-        let middle = space.center();
-        for (bit, &axis) in self.knobs.split.axes().iter().enumerate() {
-            let end = if octant >> bit & 1 == 1 { &mut space.min } else { &mut space.max };
-            end[axis] = middle[axis];
-        }
-        space
+        let space = &self.nodes[node as usize].space;
+        self.knobs.split.part(space, space.center(), octant)
     }
 
     fn is_leaf(&self, node: u32) -> bool {
@@ -748,9 +740,6 @@ impl<R: Rules + Send> Index for Tree<R> {
         }
         let mut seen = vec![0_u32; boxes.len()];
         order.iter().try_for_each(|node| self.check_node(node.0, boxes, &mut seen))?;
-        match seen.iter().position(|&times| times != 1) {
-            Some(object) => Err(format!("object {object} hangs at {} nodes", seen[object])),
-            None => Ok(()),
-        }
+        each_once(&seen)
     }
 }

@@ -1,5 +1,9 @@
 //! What the octrees and quadtrees of Wortel 2011 can be told.
 
+use glam::DVec3;
+
+use crate::math::Aabb;
+
 /// Along which axes a node's space is halved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Split {
@@ -16,6 +20,24 @@ impl Split {
             Self::Octants => &[0, 1, 2],
             Self::Quadrants => &[0, 2],
         }
+    }
+
+    /// In which octant around `point` another one is: bit a is set for the upper half along the a-th axis.
+    #[inline]
+    pub(super) fn octant(self, point: DVec3, at: DVec3) -> usize {
+        let bit = |(bit, &axis): (usize, &usize)| usize::from(at[axis] >= point[axis]) << bit;
+        self.axes().iter().enumerate().map(bit).sum()
+    }
+
+    /// The part of a space that is in an octant around a point of it.
+    #[inline]
+    pub(super) fn part(self, space: &Aabb, point: DVec3, octant: usize) -> Aabb {
+        let mut part = *space;
+        for (bit, &axis) in self.axes().iter().enumerate() {
+            let end = if octant >> bit & 1 == 1 { &mut part.min } else { &mut part.max };
+            end[axis] = point[axis];
+        }
+        part
     }
 }
 

@@ -10,7 +10,7 @@ use proptest::test_runner::{Config, TestRunner};
 use crate::common::{ORACLES, SCENES, gate, world};
 
 /// Every culler meets every index on two of the scenes at least, with either proxy; on all of them over the
-/// first two indexes.
+/// first two indexes, but for the cullers to which a device is slow.
 #[test]
 fn every_member_holds_on_every_scene() {
     for (number, scene) in SCENES.into_iter().enumerate() {
