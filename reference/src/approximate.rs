@@ -90,6 +90,7 @@ pub fn draw(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::window::WindowVertex;
     use crate::{Faces, Viewport, naive};
 
     const VIEWPORT: Viewport = Viewport { width: 40, height: 30 };
@@ -133,5 +134,29 @@ mod tests {
             double <= f64::from(f32::EPSILON) && single > double && single < 1e-3,
             "{double} {single}"
         );
+    }
+
+    /// A plane leaves the range of its corners where its triangle is thin; what is stored does not, nor is
+    /// it ever −0.
+    #[test]
+    fn depths_stay_among_those_of_the_corners() {
+        let at = |x: i32, y: i32, z: f32| WindowVertex { x, y, z };
+        for interpolation in [Interpolation::PlaneF64, Interpolation::PlaneF32] {
+            let arithmetic = Approximate { interpolation, matrix: None };
+            let of = |v: [WindowVertex; 3], at: [i64; 2]| {
+                let triangle = Oriented::new(v, Faces::Both).expect("an area");
+                arithmetic.depth(&triangle, [1, 1, 1], at)
+            };
+            for [low, high] in [[0.2, 0.7], [-0.7, -0.2]] {
+                let sloped = [at(0, 0, low), at(25_600, 0, high), at(0, 25_600, low)];
+                let middle = of(sloped, [12_800, 128]);
+                assert!((middle - (low + high) * 0.5).abs() < 1e-6, "{middle}");
+                assert_eq!(of(sloped, [30_000, 128]), high);
+                assert_eq!(of(sloped, [-5_000, 128]), low);
+            }
+            // Less than half of the smallest float below zero.
+            let tiny = [at(0, 0, 0.0), at(25_600, 0, f32::from_bits(1)), at(0, 25_600, 0.0)];
+            assert_eq!(of(tiny, [-5_000, 128]).to_bits(), 0);
+        }
     }
 }

@@ -232,4 +232,33 @@ mod tests {
         assert!(w(1.0) && w(f32::MIN_POSITIVE) && w(f32::MAX));
         assert!(!w(0.0) && !w(-1.0) && !w(1e-45) && !w(f32::NAN));
     }
+
+    /// What has no image has the seventh bit, beside those of the planes that it is beyond.
+    #[test]
+    fn what_does_not_project_is_outside() {
+        let clipper = Clipper::new(VIEWPORT, DepthOrder::Forward);
+        assert_eq!(clipper.outside([0.0, 0.0, 0.5, 1.0]), 0);
+        assert_eq!(clipper.outside([0.0, 0.0, 0.0, 0.0]), 1 << 6);
+        assert_eq!(clipper.outside([0.0, 0.0, 0.0, -1.0]) & 1 << 6, 1 << 6);
+        assert_eq!(clipper.outside([f32::NAN, 0.0, 0.5, 1.0]) & 1 << 6, 1 << 6);
+        assert_eq!(clipper.outside([0.0, 0.0, f32::INFINITY, 1.0]) & 1 << 6, 1 << 6);
+    }
+
+    /// A corner exactly on a plane is inside: the edge from it to an outside one is cut there all the same,
+    /// where rounding puts it, and the edge to an inside one is not.
+    #[test]
+    fn a_corner_on_a_plane_is_inside() {
+        let clipper = Clipper::new(VIEWPORT, DepthOrder::Forward);
+        let (on, out, inside) =
+            ([0.1, 0.7, 0.0, 1.3], [3.3, -0.2, -0.6, 2.1], [0.3, 0.1, 0.5, 1.0]);
+        // All of the way from the outside corner, each operation rounded once.
+        let at: ClipVertex = std::array::from_fn(|c| out[c] + (on[c] - out[c]));
+        assert_ne!(at, on);
+        let t = -0.6_f32 / (-0.6_f32 - 0.5_f32);
+        let cut: ClipVertex = std::array::from_fn(|c| out[c] + t * (inside[c] - out[c]));
+        let corners = |triangle| clipper.clip(triangle).map(|polygon| polygon.corners().to_vec());
+        assert_eq!(corners([on, out, inside]), Some(vec![on, at, cut, inside]));
+        assert_eq!(corners([on, inside, out]), Some(vec![at, on, inside, cut]));
+        assert_eq!(corners([on, inside, [0.2, 0.2, 0.0, 1.0]]).map(|c| c.len()), Some(3));
+    }
 }

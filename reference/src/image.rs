@@ -325,3 +325,84 @@ impl Region<'_> {
 fn draw_index_of(word: u64) -> Option<u32> {
     (word as u32).checked_sub(1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two regions by two, none of them whole; depths fall from block to block.
+    fn slope() -> Image {
+        let mut image = Image::new(Viewport { width: 150, height: 140 });
+        for (row, column) in (0..140).flat_map(|row| (0..150).map(move |column| (row, column))) {
+            let depth = 1.0 - (row / BLOCK * 19 + column / BLOCK + 1) as f32 / 1024.0;
+            image.lower(
+                column,
+                row,
+                u64::from(depth.to_bits()) << 32 | (row * 150 + column) as u64,
+            );
+        }
+        image
+    }
+
+    /// Every block's bound as the renderer leaves it: its farthest depth.
+    fn bounded(mut image: Image) -> Image {
+        for block in 0..image.far.len() {
+            let (row, column) = (block / BLOCKS * BLOCK, block % BLOCKS * BLOCK);
+            let words = (0..BLOCK).flat_map(|i| {
+                let first = (row + i) * REGION + column;
+                image.words[first..first + BLOCK].iter()
+            });
+            image.far[block] = words.map(|word| (word >> 32) as u32).max().unwrap_or(0);
+            image.stale[block] = false;
+        }
+        image
+    }
+
+    /// Traces and golden files are compared by it; the numbers are from a few lines of Python.
+    #[test]
+    fn the_hash_is_the_written_one() {
+        assert_eq!(slope().hash(), 13_016_616_300_424_054_292);
+        assert_eq!(Image::new(Viewport { width: 3, height: 2 }).hash(), 11_438_543_860_063_376_956);
+    }
+
+    /// A bound below the farthest depth does not hold, one above it only where it is marked.
+    #[test]
+    fn bounds_hold_or_are_found_out() {
+        let unmarked = bounded(slope());
+        assert!(slope().bounds_hold() && unmarked.bounds_hold());
+        for block in (0..unmarked.far.len()).filter(|&block| unmarked.far[block] > 0) {
+            let with = |far: u32, stale: bool| {
+                let mut image = unmarked.clone();
+                (image.far[block], image.stale[block]) = (far, stale);
+                image.bounds_hold()
+            };
+            let far = unmarked.far[block];
+            assert!(with(far, true) && with(far + 1, true), "{block}");
+            assert!(!with(far + 1, false), "{block} is marked as its farthest");
+            assert!(!with(far - 1, true) && !with(far - 1, false), "{block} is farther");
+        }
+    }
+
+    /// Each block is left out by its own bound, at whatever region it is.
+    #[test]
+    fn blocks_are_found_by_their_bounds() {
+        let image = bounded(slope());
+        for (row, column) in [(0, 0), (40, 64), (127, 127), (128, 5), (16, 128), (139, 149)] {
+            let block = [column, row].map(|at: u32| at / BLOCK as u32 * BLOCK as u32);
+            let end = [block[0] as usize + BLOCK, block[1] as usize + BLOCK];
+            let depth = image.depth((row * 150 + column) as usize);
+            let count = |depth: f32| {
+                image
+                    .near_blocks(block, [end[0] as u32, end[1] as u32], depth.to_bits())
+                    .collect::<Vec<_>>()
+            };
+            let whole = [block[0] as usize, block[1] as usize, end[0].min(150), end[1].min(140)];
+            assert_eq!(count(depth), [whole], "{row} {column}");
+            assert_eq!(count(depth.next_up()).len(), 0, "{row} {column} is nearer than that");
+        }
+        // Nowhere, and beyond either end.
+        assert_eq!(image.near_blocks([9, 9], [9, 20], 0).count(), 0);
+        assert_eq!(image.near_blocks([9, 9], [20, 9], 0).count(), 0);
+        assert_eq!(image.near_blocks([150, 0], [400, 400], 0).count(), 0);
+    }
+}

@@ -363,14 +363,15 @@ mod tests {
         // A quarter pixel, and a step of the window's grid.
         let (quarter, step) = (0.25_f64, 1.0 / 256.0);
         for (i, triangle) in sides(-0.25).into_iter().enumerate() {
-            // Snapping moves the leaning side by at most half a step along either axis.
-            let slack = if i == 0 { 1e-6 } else { step };
+            // The upright side is 20,480 sub-pixels long: less than half of one in its edge values. Snapping
+            // moves the leaning side by at most half a step along either axis.
+            let slack = if i == 0 { 5e-8 } else { step };
             assert_eq!(of(ONE, &[triangle], within(quarter + slack)).parts, [Fate::May]);
             assert_eq!(of(ONE, &[triangle], within(quarter - slack)).parts, [Fate::Must]);
             assert_eq!(of(ONE, &[triangle], Tolerance::EXACT).parts, [Fate::Must]);
         }
         for (i, triangle) in sides(0.25).into_iter().enumerate() {
-            let slack = if i == 0 { 1e-6 } else { step };
+            let slack = if i == 0 { 5e-8 } else { step };
             assert_eq!(of(ONE, &[triangle], within(quarter + slack)).parts, [Fate::May]);
             assert_eq!(of(ONE, &[triangle], within(quarter - slack)).parts, [Fate::Hidden]);
             assert_eq!(of(ONE, &[triangle], Tolerance::EXACT).parts, [Fate::Hidden]);
@@ -422,7 +423,7 @@ mod tests {
     fn a_line_may_show_what_is_near_it() {
         let at = |x: f32, y: f32, z: f32| [2.0 * x, -2.0 * y, z];
         // A quarter pixel to the right of the sample.
-        let line = [at(0.25, -1.0, 0.3), at(0.25, 1.0, 0.5), at(0.25, 0.0, 0.2)];
+        let line = [at(0.25, -1.0, 0.3), at(0.25, 1.0, 0.5), at(0.25, -0.7, 0.2)];
         assert_eq!(of(ONE, &[line], within(0.25)).parts, [Fate::May]);
         assert_eq!(of(ONE, &[line], within(0.25 - 1.0 / 1024.0)).parts, [Fate::Hidden]);
         assert_eq!(of(ONE, &[line], Tolerance::EXACT).parts, [Fate::Hidden]);
@@ -430,6 +431,35 @@ mod tests {
         let before = |z: f32| of(ONE, &[line, flat(z)], within(0.3)).parts;
         assert_eq!(before(0.21), [Fate::May, Fate::May], "its nearest is before");
         assert_eq!(before(0.19), [Fate::Hidden, Fate::Must], "all of it is behind");
+        // Through the sample itself: nothing by the raster rules, perhaps something on a device.
+        let through = line.map(|[_, y, z]| [0.0, y, z]);
+        assert_eq!(of(ONE, &[through], Tolerance::EXACT).parts, [Fate::Hidden]);
+        assert_eq!(of(ONE, &[through], within(1e-6)).parts, [Fate::May]);
+    }
+
+    /// The samples that are looked at are those within the tolerance of the triangle's box, and no more.
+    #[test]
+    fn samples_are_those_near_the_box() {
+        let viewport = Viewport { width: 7, height: 5 };
+        let at = |x: i32, y: i32| WindowVertex { x, y, z: 0.5 };
+        for (from, to) in
+            [([128, 128], [128, 128]), ([300, 129], [1100, 640]), ([-900, 383], [5000, 385])]
+        {
+            for pixels in [0.0, 0.25, 1.0] {
+                let allowed = Allowed { viewport, order: DepthOrder::Forward, pixels, ulps: 0 };
+                let v = [at(from[0], to[1]), at(to[0], from[1]), at(from[0], from[1])];
+                let found: Vec<(usize, [i64; 2])> = allowed.samples(&v).collect();
+                let reach = (pixels * 256.0) as i64;
+                let near = |at: i64, axis: usize| {
+                    (i64::from(from[axis]) - reach..=i64::from(to[axis]) + reach).contains(&at)
+                };
+                let all =
+                    (0..35_usize).map(|i| (i, [i % 7, i / 7].map(|at| at as i64 * 256 + 128)));
+                let expected: Vec<_> =
+                    all.filter(|(_, [x, y])| near(*x, 0) && near(*y, 1)).collect();
+                assert_eq!(found, expected, "{from:?} {to:?} {pixels}");
+            }
+        }
     }
 
     /// Depth at the far plane loses against a cleared sample.

@@ -324,3 +324,85 @@ fn hidden_clusters_are_left_out() {
     assert!(some.units_hidden + some.clusters_hidden > 0 && all.clusters_hidden == 0, "{some:?}");
     assert!(some.triangles * 2 < all.triangles, "{some:?} {all:?}");
 }
+
+/// Sixty-five clusters, and so a unit of one that is not all of its mesh, before and after other meshes;
+/// at every level.
+#[test]
+fn what_is_left_of_a_mesh_is_a_unit() {
+    let (positions, triangles) = patch(51, &[0.0, 0.2, 0.1, 0.3, 0.05]);
+    let place = |x: f32| perspective(1.0, [x, 0.2 * x, -4.0], 0.1 * x);
+    let large = Model {
+        positions,
+        triangles: triangles[..65 * 80].to_vec(),
+        matrices: vec![place(-1.0), place(1.5)],
+    };
+    let (positions, triangles) = patch(10, &[0.1, 0.0, 0.3]);
+    let small = Model { positions, triangles, matrices: vec![place(0.5), place(-0.5)] };
+    let (positions, triangles) = patch(3, &[0.0, 0.4]);
+    let single = Model { positions, triangles, matrices: vec![place(0.2), place(-0.2)] };
+    let models = [large.clone(), small, single, large];
+    let viewport = Viewport { width: 150, height: 140 };
+    compare(viewport, DepthOrder::Forward, &models, Faces::Both, all_ways()).unwrap();
+}
+
+/// Outside the view a unit is nowhere, and so not hidden either.
+#[test]
+fn what_is_outside_is_not_hidden() {
+    let (positions, triangles) = patch(3, &[0.0]);
+    let ranks: Vec<u32> = (0..triangles.len() as u32).collect();
+    let mesh = Mesh::new(&positions, &triangles, &ranks);
+    let beside = Instance::new(&mesh, 0, perspective(1.0, [90.0, 0.0, -9.0], 0.0), Faces::Both);
+    let mut image = Image::new(Viewport { width: 60, height: 50 });
+    let work = fast::render(&mut image, &[beside], Options::default());
+    assert_eq!(work, fast::Work { units: 1, clusters_outside: 1, ..fast::Work::default() });
+}
+
+#[test]
+fn a_mesh_says_what_it_holds() {
+    let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let one = Mesh::new(&triangle, &[[0, 1, 2]], &[7]);
+    // A box, three components of sixteen vertices, sixteen triangles' corners and ranks, and a cluster.
+    assert_eq!((one.triangle_count(), one.bytes()), (1, (6 + 3 * 16 + 2 * 16) * 4 + 8));
+    let (positions, triangles) = patch(10, &[0.0]);
+    let ranks: Vec<u32> = (0..200).collect();
+    let some = Mesh::new(&positions, &triangles, &ranks);
+    // Two full clusters and one of forty; each of up to 64 vertices.
+    assert_eq!(some.triangle_count(), 200);
+    let triangles_padded = 80 + 80 + 48;
+    let without_vertices = (3 * 6 + 2 * triangles_padded) * 4 + 3 * 8;
+    let vertices = (some.bytes() - without_vertices) / (3 * 4);
+    assert!((some.bytes() - without_vertices).is_multiple_of(3 * 16 * 4), "{}", some.bytes());
+    assert!((121..=3 * 64).contains(&vertices), "{vertices} vertices, padded, of 121");
+    let empty = Mesh::new(&[], &[], &[]);
+    assert_eq!((empty.triangle_count(), empty.bytes()), (0, 0));
+}
+
+/// The highest draw index of an instance is the last but one that 32 bits hold.
+#[test]
+fn the_last_draw_index_fits() {
+    let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let mesh = Mesh::new(&triangle, &[[0, 1, 2], [0, 1, 2]], &[2, 5]);
+    let instance = |first: u32| Instance::new(&mesh, first, IDENTITY, Faces::Both);
+    let mut image = Image::new(Viewport { width: 4, height: 4 });
+    fast::render(&mut image, &[instance(u32::MAX - 6)], Options::default());
+    assert_eq!(
+        image.draw_indices().flatten().max(),
+        Some(u32::MAX - 4),
+        "the lower of equal depths"
+    );
+    for first in [u32::MAX - 5, u32::MAX - 4, u32::MAX] {
+        assert!(std::panic::catch_unwind(|| instance(first)).is_err(), "{first}");
+    }
+}
+
+#[test]
+fn levels_are_named() {
+    for level in SimdLevel::ALL {
+        assert_eq!(level.to_string().parse(), Ok(level));
+    }
+    let error = "sse3".parse::<SimdLevel>().expect_err("no such level");
+    assert_eq!(
+        error,
+        "no SIMD level \"sse3\"; the levels are scalar, sse2, sse4.2, neon, avx2, avx512"
+    );
+}

@@ -399,4 +399,272 @@ mod tests {
         }
         assert!(narrow > 100_000 && outside > 1000, "{narrow} {outside} prove little");
     }
+
+    /// A matrix by its rows: what x, y, z and w are made of.
+    fn of_rows(rows: [[f32; 4]; 4]) -> [f32; 16] {
+        std::array::from_fn(|i| rows[i % 4][i / 4])
+    }
+
+    /// Where a box under a matrix is, in the last of sixteen lanes.
+    fn place(
+        viewport: Viewport,
+        order: DepthOrder,
+        m: [f32; 16],
+        [low, high]: [[f32; 3]; 2],
+    ) -> Place {
+        let mut batch = Batch::new();
+        let last = LANES - 1;
+        m.into_iter().enumerate().for_each(|(i, element)| batch.matrix[i][last] = element);
+        low.into_iter().chain(high).enumerate().for_each(|(i, at)| batch.boxes[i][last] = at);
+        dispatch!(Level::new(), s => Projection::new(viewport, order).clusters(s, &batch))[last]
+    }
+
+    /// The same for a box that is the point (t, 0, 0).
+    fn place_of(viewport: Viewport, order: DepthOrder, rows: [[f32; 4]; 4], t: f32) -> Place {
+        place(viewport, order, of_rows(rows), [[t, 0.0, 0.0]; 2])
+    }
+
+    const U: f64 = 1.0 / (1_u64 << 24) as f64;
+    const ORDERS: [DepthOrder; 2] = [DepthOrder::Forward, DepthOrder::Reversed];
+    /// So small that a margin is no hundredth of a pixel.
+    const SMALL: Viewport = Viewport { width: 64, height: 64 };
+
+    /// Rows that put the point (t, 0, 0) at a distance of 1 − t from a plane, to the bit, and far from the
+    /// others; that distance's terms add up to 1 + t. All eight that the orders have.
+    fn planes() -> impl Iterator<Item = (DepthOrder, usize, [[f32; 4]; 4])> {
+        ORDERS.into_iter().flat_map(|order| {
+            (0..6).map(move |plane| {
+                let z = (order.range()[0] + order.range()[1]) * 0.5;
+                let mut rows = [[0.0; 4], [0.0; 4], [0.0, 0.0, 0.0, z], [0.0, 0.0, 0.0, 1.0]];
+                let (row, slope, offset) = match (plane, order) {
+                    (0, DepthOrder::Forward) => (2, -1.0, 1.0),
+                    (0, DepthOrder::Reversed) => (2, -1.0, 0.0),
+                    (1, DepthOrder::Forward) => (2, 1.0, 0.0),
+                    (1, DepthOrder::Reversed) => (2, 1.0, -1.0),
+                    (2 | 4, _) => (plane / 2 - 1, -1.0, 0.0),
+                    _ => (plane / 2 - 1, 1.0, 0.0),
+                };
+                rows[row] = [slope, 0.0, 0.0, offset];
+                (order, plane, rows)
+            })
+        })
+    }
+
+    /// At four times the error of a distance a cluster is not yet outside, beyond it is.
+    #[test]
+    fn outside_begins_at_its_margin() {
+        for (order, plane, rows) in planes() {
+            let mut outside = 0;
+            for step in 50..80 {
+                let t = 1.0 + f64::from(step) * 2.0 * U;
+                let expected = t - 1.0 > 4.0 * 16.0 * U * (1.0 + t);
+                let place = place_of(SMALL, order, rows, t as f32);
+                assert_eq!(
+                    place == Place::Outside,
+                    expected,
+                    "{order:?} {plane} {step}: {place:?}"
+                );
+                outside += u32::from(expected);
+            }
+            assert_eq!(outside, 15, "the margin is between steps 64 and 65");
+        }
+    }
+
+    /// At the error of a distance within near and far a cluster is narrow, short of it wide.
+    #[test]
+    fn narrow_begins_at_its_margin() {
+        for (order, plane, rows) in planes().filter(|&(_, plane, _)| plane < 2) {
+            let mut narrow = 0;
+            for step in 1..30 {
+                let t = 1.0 - f64::from(step) * 2.0 * U;
+                let expected = 1.0 - t >= 16.0 * U * (1.0 + t);
+                let place = place_of(SMALL, order, rows, t as f32);
+                let is = matches!(place, Place::Narrow { .. });
+                assert_eq!(is, expected, "{order:?} {plane} {step}: {place:?}");
+                narrow += u32::from(expected);
+            }
+            assert_eq!(narrow, 14, "the margin is at step 16");
+        }
+    }
+
+    /// w must be above its error: t − 1 here, beside a depth far below.
+    #[test]
+    fn before_the_eye_begins_at_its_margin() {
+        for order in ORDERS {
+            let z = (U / 2.0) as f32 * if order == DepthOrder::Forward { 1.0 } else { -1.0 };
+            let rows = [[0.0; 4], [0.0; 4], [0.0, 0.0, 0.0, z], [1.0, 0.0, 0.0, -1.0]];
+            let mut narrow = 0;
+            for step in 1..30 {
+                let t = 1.0 + f64::from(step) * 2.0 * U;
+                let expected = t - 1.0 > 16.0 * U * (1.0 + t);
+                let place = place_of(SMALL, order, rows, t as f32);
+                let is = matches!(place, Place::Narrow { .. });
+                assert_eq!(is, expected, "{order:?} {step}: {place:?}");
+                narrow += u32::from(expected);
+            }
+            assert_eq!(narrow, 13, "the margin is between steps 16 and 17");
+        }
+    }
+
+    /// Terms that are all zero err as denormals may; terms that may overflow err by anything.
+    #[test]
+    fn the_smallest_and_the_largest_sums_have_a_margin() {
+        let w = |w: f32, z: f32| [[0.0; 4], [0.0; 4], [0.0, 0.0, 0.0, z], [0.0, 0.0, 0.0, w]];
+        let of = |w_: f32, z: f32| place_of(SMALL, DepthOrder::Forward, w(w_, z), 0.0);
+        assert_eq!(of(1.0, 0.0), Place::Wide, "on the near plane");
+        let step = f32::MIN_POSITIVE;
+        assert_eq!(of(1.0, step), Place::Wide, "less than the error before it");
+        // The term's own error there is 2⁻²⁰ of it, eight denormals.
+        let farther = step * (1.0 + 2.0_f32.powi(-19));
+        assert!(matches!(of(1.0, farther), Place::Narrow { near: 0, .. }), "the error before it");
+        let large = (125.0_f32).exp2();
+        assert!(matches!(of(large.next_down(), large * 0.5), Place::Narrow { .. }));
+        assert_eq!(of(large, large * 0.5), Place::Wide);
+    }
+
+    /// What [`Projection::clusters`] says of columns and rows, in f64: how far either way from the exact
+    /// column of x/w its bounds lie.
+    fn reach(x: f64, w: f64, half: f64) -> f64 {
+        let (ex, ew) = (16.0 * U * x.abs(), 16.0 * U * w);
+        let most = (x / w).abs();
+        let quotient = (most * ew + ex) / (w - ew) + most * 8.0 * U;
+        quotient * 2.0 * half + 6.0 * U * half + 1.0 / 256.0
+    }
+
+    /// A pixel more begins where the margin reaches over its edge.
+    #[test]
+    fn pixels_reach_as_far_as_their_margin() {
+        let viewport = Viewport { width: 16_384, height: 16_384 };
+        // Where floats of columns are finest, and the largest quotients before them.
+        let (half, w) = (8192.0, 2.0);
+        let at = |column: f64| (column - half) / half * w;
+        for axis in 0..2 {
+            // Rows go down.
+            let slope = [1.0, -1.0][axis];
+            let mut rows = [[0.0; 4], [0.0; 4], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, w as f32]];
+            rows[axis][0] = slope;
+            let (mut undecided, mut pixels) = (0, [0_u32; 2]);
+            for step in 0..100 {
+                for (side, edge) in [819.0, 820.0].into_iter().enumerate() {
+                    // 0.02 to 0.07 pixels within the pixel, in steps of the floats there.
+                    let off = 0.02 + f64::from(step) * 0.000_5;
+                    let x = at(if side == 0 { edge + off } else { edge - off }) as f32;
+                    let exact = f64::from(x) / w * half + half;
+                    let margin = reach(f64::from(x), w, half);
+                    let ends = [exact - margin, exact + margin];
+                    // The bound's own additions round to 2⁻¹⁴ pixels there.
+                    if (ends[side] - edge).abs() < 2.0 / 16_384.0 {
+                        undecided += 1;
+                        continue;
+                    }
+                    let place = place_of(viewport, DepthOrder::Forward, rows, x);
+                    let Place::Narrow { min, max, .. } = place else { panic!("{place:?}") };
+                    let got = [min[axis], max[axis]];
+                    assert_eq!(got.map(f64::from), ends.map(f64::floor), "{axis} {x}");
+                    pixels[side] += u32::from(got[side] != 819);
+                }
+            }
+            assert!(undecided < 4 && pixels.iter().all(|n| (25..75).contains(n)), "{pixels:?}");
+        }
+    }
+
+    /// The depth bound lies before the depth by twice the error of a quotient.
+    #[test]
+    fn depths_are_bound_by_their_margin() {
+        for order in ORDERS {
+            for depth in [0.125_f64, 0.25, 0.5, 0.75] {
+                let depth = depth + f64::from(order.range()[0]);
+                let w = 2.0_f64;
+                let rows = [
+                    [0.0; 4],
+                    [0.0; 4],
+                    [0.0, 0.0, 0.0, (depth * w) as f32],
+                    [0.0, 0.0, 0.0, w as f32],
+                ];
+                let most = depth.abs();
+                let (ez, ew) = (16.0 * U * most * w, 16.0 * U * w);
+                let margin = 2.0 * ((most * ew + ez) / (w - ew) + most * 8.0 * U);
+                let place = place_of(SMALL, order, rows, 0.0);
+                let Place::Narrow { near, .. } = place else { panic!("{place:?}") };
+                let off = depth - f64::from(order.depth(near));
+                // The difference rounds to half a float there.
+                assert!((off - margin).abs() <= most * U, "{order:?} {depth}: {off} {margin}");
+            }
+        }
+    }
+
+    /// 120 pixels are narrow, 121 are not, nor is a cluster beyond either end outside by a pixel too early.
+    #[test]
+    fn narrow_ends_at_its_pixels() {
+        let viewport = Viewport { width: 1024, height: 1024 };
+        let rows = [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, -1.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.5],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        let at = |pixel: f32| (pixel - 512.0) / 512.0;
+        for axis in 0..2 {
+            let of = |from: f32, to: f32| {
+                let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
+                (low[axis], high[axis]) = (at(from), at(to));
+                place(viewport, DepthOrder::Forward, of_rows(rows), [low, high])
+            };
+            let narrow = of(100.5, 219.5);
+            assert!(
+                matches!(narrow, Place::Narrow { min, max, .. } if (min[axis], max[axis]) == (100, 219)),
+                "{narrow:?}"
+            );
+            assert_eq!(of(100.5, 220.5), Place::Wide);
+            // Within a pixel of the image's edge it may touch it; a pixel beyond it does not.
+            assert!(matches!(of(-20.5, 0.0), Place::Narrow { .. }));
+            assert_eq!(of(-20.5, -0.5), Place::Outside);
+            assert!(matches!(of(1024.0, 1044.5), Place::Narrow { .. }));
+            assert_eq!(of(1024.5, 1044.5), Place::Outside);
+        }
+    }
+    /// Beyond two planes at once is outside too.
+    #[test]
+    fn beyond_two_planes_is_outside() {
+        for order in ORDERS {
+            let before_near = order.range()[0] - 1.0;
+            for (x, y) in [(-3.0, 0.0), (3.0, 0.0), (0.0, -3.0), (0.0, 3.0)] {
+                let rows = [
+                    [0.0, 0.0, 0.0, x],
+                    [0.0, 0.0, 0.0, y],
+                    [0.0, 0.0, 0.0, before_near],
+                    [0.0, 0.0, 0.0, 1.0],
+                ];
+                assert_eq!(place_of(SMALL, order, rows, 0.0), Place::Outside, "{x} {y}");
+            }
+        }
+    }
+
+    /// Where the errors of clip coordinates are pixels, pixels decide before the planes do: at two
+    /// errors beyond the edge instead of four.
+    #[test]
+    fn aside_is_outside() {
+        // x and y are differences of numbers of 2¹⁴ and so err by 1/32 of w, which is two pixels.
+        let offset = 16_384.0_f32;
+        let rows = [
+            [1.0, 0.0, 0.0, -offset],
+            [0.0, 1.0, 0.0, -offset],
+            [0.0, 0.0, 0.0, 0.5],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        let of = |x: f32, y: f32| {
+            let point = [offset + x, offset + y, 0.0];
+            place(SMALL, DepthOrder::Forward, of_rows(rows), [point; 2])
+        };
+        let near_edge = 1.0 + 1.5 / 32.0;
+        let aside = 1.0 + 3.0 / 32.0;
+        for x in [-1.0, 0.0, 1.0] {
+            for y in [-1.0, 0.0, 1.0] {
+                let within = of(x * near_edge, y * near_edge);
+                assert!(matches!(within, Place::Narrow { .. }), "{x} {y}: {within:?}");
+                let expected = x != 0.0 || y != 0.0;
+                assert_eq!(of(x * aside, y * aside) == Place::Outside, expected, "{x} {y}");
+            }
+        }
+    }
 }

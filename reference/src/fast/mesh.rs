@@ -249,3 +249,56 @@ struct Source<'a> {
     ranks: &'a [u32],
     centers: &'a [[f32; 3]],
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn extents_are_half_the_longest_side() {
+        let triangle = |order: [usize; 3]| {
+            let corners = [[10.0_f32, -20.0, 3.0], [13.0, -19.0, 5.0], [11.0, -16.0, 4.0]];
+            corners.map(|corner| order.map(|axis| corner[axis]))
+        };
+        for order in [[0, 1, 2], [1, 2, 0], [2, 0, 1]] {
+            assert_eq!(extent(triangle(order)), 2.0, "{order:?}");
+        }
+    }
+
+    /// More than eight times the median is large; exactly eight times is not, nor is anything in a mesh of
+    /// one cluster.
+    #[test]
+    fn large_triangles_come_first() {
+        let mut extents = vec![0.01_f32; 70];
+        extents.extend([1.0; 100]);
+        extents.extend([8.0; 3]);
+        extents.splice(30..30, [8.5, 100.0]);
+        let mut order: Vec<u32> = (0..175).rev().collect();
+        assert_eq!(large_first(&mut order, &extents), 2);
+        let expected: Vec<u32> = [30, 31].into_iter().chain(0..30).chain(32..175).collect();
+        assert_eq!(order, expected);
+        let mut few: Vec<u32> = (0..80).collect();
+        extents[79] = 1e9;
+        assert_eq!(large_first(&mut few, &extents), 0);
+        let mut more: Vec<u32> = (0..81).collect();
+        assert!(large_first(&mut more, &extents) > 0 && more[0] == 30);
+    }
+
+    /// Eighty triangles without common vertices have too many vertices for a cluster, and are halved twice.
+    #[test]
+    fn clusters_end_at_their_vertices() {
+        let positions: Vec<[f32; 3]> = (0..240).map(|i| [i as f32, (i % 3) as f32, 0.0]).collect();
+        let triangles: Vec<[u32; 3]> = (0..80).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let ranks: Vec<u32> = (0..80).collect();
+        let mesh = Mesh::new(&positions, &triangles, &ranks);
+        let counts: Vec<_> = mesh.clusters.iter().map(|c| (c.triangles, c.vertices)).collect();
+        assert_eq!(counts, [(20, 60); 4]);
+        // In the order of their places, each with its own box and ranks.
+        for (i, &cluster) in mesh.clusters.iter().enumerate() {
+            let first = 60.0 * i as f32;
+            assert_eq!((mesh.boxes[0][i], mesh.boxes[3][i]), (first, first + 59.0));
+            let ranks = 20 * i as u32..20 * (i as u32 + 1);
+            assert_eq!(mesh.view(cluster).ranks[..20], ranks.collect::<Vec<_>>());
+        }
+    }
+}

@@ -212,3 +212,128 @@ pub(crate) fn samples<S: Simd, O: Order>(
     }
     any
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::Faces;
+    use crate::window::WindowVertex;
+
+    const ORIGIN: [i32; 2] = [128, 256];
+
+    /// Triangles over the region at [`ORIGIN`], in pixels from it, whose planes rise and fall along both axes.
+    fn triangles() -> Vec<Oriented> {
+        let at = |[x, y, z]: [f32; 3]| WindowVertex {
+            x: (x * 256.0) as i32 + ORIGIN[0] * 256,
+            y: (y * 256.0) as i32 + ORIGIN[1] * 256,
+            z,
+        };
+        [
+            [[-20.0, -10.3, 0.1], [150.7, 5.0, 0.9], [30.0, 160.2, 0.3]],
+            [[-20.0, -10.3, 0.9], [150.7, 5.0, 0.1], [30.0, 160.2, 0.5]],
+            [[60.1, 140.0, 0.2], [-40.0, -30.0, 0.8], [140.0, 20.0, 0.7]],
+            [[-300.0, -70.0, 0.0], [40.0, 900.0, 1.0], [700.0, -60.0, 0.4]],
+            [[3.0, 4.0, 0.25], [90.0, 8.0, 0.5], [50.0, 100.0, 0.25]],
+        ]
+        .into_iter()
+        .map(|corners| Oriented::new(corners.map(at), Faces::Both).expect("an area"))
+        .collect()
+    }
+
+    fn edges(triangle: &Oriented) -> [Edge; 3] {
+        three!(i => Edge::new(triangle, i, ORIGIN))
+    }
+
+    /// Places of samples in a block, from the region's first one.
+    fn samples([column, row]: [i64; 2]) -> impl Iterator<Item = [i64; 2]> {
+        (0..64).map(move |i| [column * 8 + i % 8, row * 8 + i / 8])
+    }
+
+    #[test]
+    fn edges_are_known_at_samples() {
+        for triangle in triangles() {
+            for (i, edge_of) in edges(&triangle).into_iter().enumerate() {
+                let (a, b) = (triangle.v[(i + 1) % 3], triangle.v[(i + 2) % 3]);
+                for at in [[0, 0], [1, 0], [0, 1], [127, 5], [64, 127], [-3, 9]] {
+                    let center = |axis: usize| (at[axis] + i64::from(ORIGIN[axis])) * 256 + 128;
+                    let exact = edge(a, b, center(0), center(1));
+                    assert_eq!(edge_of.exact_at(at), exact as f64);
+                    assert_eq!(edge_of.at(at), (exact - i64::from(!top_left(a, b))) >> 8);
+                }
+                for block in [[0, 0], [3, 7], [15, 15]] {
+                    let first = edge_of.at([block[0] * 8, block[1] * 8]);
+                    let most = samples(block).map(|at| edge_of.at(at)).max();
+                    assert_eq!(most, Some(first + edge_of.rise()));
+                }
+            }
+        }
+    }
+
+    /// The bound of a block lies below the least of the plane at its samples by the plane's error: not more,
+    /// or hidden blocks were drawn, and not less, or blocks were left out that show.
+    #[test]
+    fn planes_lie_below_their_triangles_by_their_error() {
+        for triangle in triangles() {
+            let edges = edges(&triangle);
+            let plane = Plane::new(&triangle, &edges);
+            let [z0, z1, z2] = triangle.v.map(|v| f64::from(v.z));
+            let area = triangle.area as f64;
+            let terms = |at: [i64; 2]| {
+                [edges[1].exact_at(at) * (z1 - z0) / area, edges[2].exact_at(at) * (z2 - z0) / area]
+            };
+            // Sizes at the first sample, and of the steps of all 128 columns and rows.
+            let size = |[a, b]: [f64; 2]| a.abs() + b.abs();
+            let step = |at: [i64; 2]| {
+                let ([a, b], [c, d]) = (terms(at), terms([0, 0]));
+                size([a - c, b - d])
+            };
+            let scale = 1.0 + size(terms([0, 0])) + step([128, 0]) + step([0, 128]);
+            for block in [[0, 0], [3, 7], [15, 15], [8, 0], [0, 12]] {
+                let least = samples(block)
+                    .map(|at| z0 + terms(at)[0] + terms(at)[1])
+                    .fold(f64::INFINITY, f64::min);
+                let [x, y] = block.map(|at| at as f64 * 8.0);
+                let bound = plane.depth + plane.right * x + plane.down * y;
+                let errors = (least - bound) / (PLANE_ERROR * scale);
+                // The test itself rounds in the tenth or so of that.
+                assert!((0.7..1.3).contains(&errors), "{triangle:?} {block:?}: {errors}");
+            }
+        }
+        assert_eq!(PLANE_ERROR, 16.0 * f64::EPSILON / 2.0);
+    }
+
+    /// Strictly behind: beyond the float after the farthest.
+    #[test]
+    fn a_plane_is_hidden_behind_the_next_depth() {
+        for (order, z) in [(DepthOrder::Forward, 0.5_f32), (DepthOrder::Reversed, -0.5)] {
+            let flat = |[x, y]: [i32; 2]| WindowVertex { x: x * 256, y: y * 256, z };
+            let corners = [[0, 0], [900, 0], [0, 900]].map(flat);
+            let triangle = Oriented::new(corners, Faces::Both).expect("an area");
+            let plane = Plane::new(&triangle, &edges(&triangle));
+            let key = order.key(z);
+            assert!(!plane.hidden(order, [8, 16], key), "a tie is not hidden");
+            assert!(!plane.hidden(order, [8, 16], key - 1), "its error reaches the next depth");
+            assert!(plane.hidden(order, [8, 16], key - 2));
+        }
+    }
+
+    /// First and last centres within the box, on the image.
+    #[test]
+    fn boxes_hold_their_centres() {
+        let viewport = Viewport { width: 100, height: 50 };
+        let of = |x: [i32; 2], y: [i32; 2]| {
+            let corners = [[x[0], y[0]], [x[1], y[0]], [x[0], y[1]]];
+            let corners = corners.map(|[x, y]| WindowVertex { x, y, z: 0.5 });
+            let triangle = Oriented::new(corners, Faces::Both).expect("an area");
+            Wide::new(triangle, 1, viewport).map(|wide| (wide.min, wide.max))
+        };
+        assert_eq!(of([128, 384], [128, 129]), Some(([0, 0], [1, 0])), "at centres");
+        assert_eq!(of([129, 383], [128, 200]), None, "between columns");
+        assert_eq!(of([128, 200], [129, 383]), None, "between rows");
+        assert_eq!(of([129, 384], [127, 384]), Some(([1, 0], [1, 1])));
+        assert_eq!(of([-900, 99_999], [-900, 99_999]), Some(([0, 0], [99, 49])));
+        assert_eq!(of([-900, -1], [0, 900]), None, "beside the image");
+        assert_eq!(of([0, 900], [50 * 256, 60 * 256]), None, "below it");
+        assert_eq!(of([99 * 256, 101 * 256], [49 * 256, 50 * 256]), Some(([99, 49], [99, 49])));
+    }
+}
