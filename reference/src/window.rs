@@ -105,3 +105,21 @@ pub(crate) fn depth([e0, e1, e2]: [f64; 3], z: [f32; 3], area: i64) -> f32 {
     let [z0, z1, z2] = z.map(f64::from);
     (((e0 * z0 + e1 * z1) + e2 * z2) / area as f64) as f32
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Depths are never −0, whose bits would be behind everything.
+    #[test]
+    fn no_depth_is_negative_zero() {
+        for order in [DepthOrder::Forward, DepthOrder::Reversed] {
+            let window = Window::new(Viewport { width: 8, height: 8 }, order);
+            // −0 itself, and what underflows to it.
+            for (z, w) in [(-0.0, 1.0), (-f32::MIN_POSITIVE, 1e9)] {
+                let vertex = window.vertex([0.25, 0.5, z, w]);
+                assert_eq!(vertex.z.to_bits(), 0, "{order:?} {z} {w}");
+            }
+        }
+    }
+}

@@ -431,3 +431,21 @@ fn set_up<S: Simd>(
         | (covered(3) & two_wide & two_high) << (3 * LANES);
     out.larger = live & !tiny;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No draw index is below it, and that of the nearest corner's depth is.
+    #[test]
+    fn nearest_is_the_least_word_of_the_nearest_corner() {
+        for (order, z) in
+            [(DepthOrder::Forward, [0.5, 0.25, 0.75]), (DepthOrder::Reversed, [-0.5, -0.75, -0.25])]
+        {
+            let least = order.key(z[1]);
+            for z in [z, [z[1], z[2], z[0]], [z[2], z[0], z[1]]] {
+                assert_eq!(nearest(order, z), i64::from(least) << 32);
+            }
+        }
+    }
+}

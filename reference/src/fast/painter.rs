@@ -110,3 +110,46 @@ impl<O: Order> Painter for Plain<O> {
         region.stale[block] = false;
     }
 }
+
+/// For tests: what it was asked to draw and to renew.
+#[cfg(test)]
+pub(crate) mod recorder {
+    use std::cell::RefCell;
+
+    use super::*;
+    use crate::order::Forward;
+
+    /// Ids and blocks that were drawn, in their order, and blocks that were renewed.
+    #[derive(Default)]
+    pub(crate) struct Record {
+        pub(crate) drawn: Vec<(u32, usize)>,
+        pub(crate) renewed: Vec<usize>,
+    }
+
+    /// Draws nothing, and says of blocks in even columns that it reached a sample there.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Recorder<'a>(pub(crate) &'a RefCell<Record>);
+
+    impl Painter for Recorder<'_> {
+        type Order = Forward;
+
+        fn block(
+            self,
+            wide: &Wide,
+            _: &mut Region<'_>,
+            _: &[Edge; 3],
+            [column, row]: [usize; 2],
+        ) -> bool {
+            self.0.borrow_mut().drawn.push((wide.id, row * BLOCKS + column));
+            column.is_multiple_of(2)
+        }
+
+        fn cluster(self, _: &Job<'_>, _: &mut Region<'_>, _: &mut Room) {
+            unreachable!("a plain frame has wide clusters only");
+        }
+
+        fn renew(self, _: &mut Region<'_>, block: usize) {
+            self.0.borrow_mut().renewed.push(block);
+        }
+    }
+}

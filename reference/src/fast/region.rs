@@ -135,3 +135,98 @@ impl Region<'_> {
         true
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+
+    use super::*;
+    use crate::draw::Faces;
+    use crate::fast::painter::recorder::{Record, Recorder};
+    use crate::fast::{self, Instance, Mesh, Options};
+    use crate::image::{Image, Viewport};
+    use crate::order::DepthOrder;
+
+    const IDENTITY: [f32; 16] =
+        [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    /// Two regions by two, none of them whole.
+    const VIEWPORT: Viewport = Viewport { width: 200, height: 150 };
+
+    /// A square of two triangles over ±`size`, at one depth.
+    fn square(size: f32, z: f32) -> Vec<[f32; 3]> {
+        [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .map(|[x, y]: [f32; 2]| [x * size, y * size, z])
+            .to_vec()
+    }
+
+    /// A mesh of squares one after the other; triangle i has rank i.
+    fn mesh(squares: &[(f32, f32)]) -> Mesh {
+        let positions: Vec<[f32; 3]> =
+            squares.iter().flat_map(|&(size, z)| square(size, z)).collect();
+        let count = positions.len() as u32 / 3;
+        let triangles: Vec<[u32; 3]> = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        Mesh::new(&positions, &triangles, &(0..count).collect::<Vec<_>>())
+    }
+
+    /// A unit that begins exactly at the farthest depth there is may still win ties.
+    #[test]
+    fn a_tie_with_the_farthest_is_drawn() {
+        let mesh = mesh(&[(1.0, 0.5)]);
+        let mut image = Image::new(VIEWPORT);
+        for first in [10, 0] {
+            let instance = Instance::new(&mesh, first, IDENTITY, Faces::Both);
+            fast::draw(&mut image, &[instance], Options::default());
+        }
+        assert!(image.draw_indices().all(|draw| draw.is_some_and(|draw| draw < 2)));
+    }
+
+    /// Bounds are the farthest depths when all is drawn, whatever was drawn there.
+    #[test]
+    fn no_bound_is_stale_after_drawing() {
+        // Large triangles, and small ones in clusters of many.
+        let mesh = mesh(&[(1.0, 0.7), (0.9, 0.5), (0.03, 0.2), (0.02, 0.3), (0.4, 0.4)]);
+        let small = {
+            let mut m = IDENTITY;
+            (m[0], m[5]) = (0.1, 0.1);
+            m
+        };
+        for place in [[0.0, 0.0], [0.8, 0.9], [-0.9, 0.3], [0.3, -0.95]] {
+            let mut moved = small;
+            (moved[12], moved[13]) = (place[0], place[1]);
+            let of = |m: [f32; 16], first: u32| Instance::new(&mesh, first, m, Faces::Both);
+            let mut image = Image::new(VIEWPORT);
+            let work =
+                fast::render(&mut image, &[of(moved, 0), of(IDENTITY, 20)], Options::default());
+            assert!(work.clusters > 0, "{work:?}");
+            assert!(image.bounds_hold());
+            assert!(image.regions().all(|region| region.stale.iter().all(|&stale| !stale)));
+        }
+    }
+
+    /// Units by their nearest depth, triangles of a unit by theirs.
+    #[test]
+    fn what_is_nearer_comes_first() {
+        let (far, near) =
+            (mesh(&[(1.0, 0.9), (0.8, 0.6), (0.9, 0.7)]), mesh(&[(0.95, 0.5), (0.97, 0.1)]));
+        let instances = [
+            Instance::new(&far, 0, IDENTITY, Faces::Both),
+            Instance::new(&near, 10, IDENTITY, Faces::Both),
+        ];
+        let names = fast::frame::names(&instances);
+        let target = (VIEWPORT, DepthOrder::Forward);
+        let (frame, _) = Frame::new(None, target, &instances, &names, true);
+        let mut image = Image::new(VIEWPORT);
+        let keys = frame.regions(VIEWPORT);
+        let recorded = RefCell::new(Record::default());
+        for (mut region, mut keys) in image.regions().zip(keys) {
+            recorded.borrow_mut().drawn.clear();
+            keys.sort_unstable();
+            draw(Recorder(&recorded), &frame, &keys, &mut region, &mut Room::new());
+            let mut squares: Vec<u32> =
+                recorded.borrow().drawn.iter().map(|&(id, _)| (id - 1) / 2).collect();
+            squares.dedup();
+            // Of the near mesh 0.1 and 0.5, of the far one 0.6, 0.7 and 0.9; two triangles each.
+            assert_eq!(squares, [6, 5, 1, 2, 0], "{:?}", region.origin);
+        }
+    }
+}

@@ -215,8 +215,12 @@ pub(crate) fn samples<S: Simd, O: Order>(
 
 #[cfg(test)]
 mod tests {
+    use std::cell::RefCell;
+
     use super::*;
     use crate::draw::Faces;
+    use crate::fast::painter::recorder::{Record, Recorder};
+    use crate::image::Image;
     use crate::window::WindowVertex;
 
     const ORIGIN: [i32; 2] = [128, 256];
@@ -273,6 +277,7 @@ mod tests {
     /// or hidden blocks were drawn, and not less, or blocks were left out that show.
     #[test]
     fn planes_lie_below_their_triangles_by_their_error() {
+        let mut within = 0;
         for triangle in triangles() {
             let edges = edges(&triangle);
             let plane = Plane::new(&triangle, &edges);
@@ -297,8 +302,19 @@ mod tests {
                 let errors = (least - bound) / (PLANE_ERROR * scale);
                 // The test itself rounds in the tenth or so of that.
                 assert!((0.7..1.3).contains(&errors), "{triangle:?} {block:?}: {errors}");
+                if !(0.001..0.999).contains(&bound) {
+                    continue;
+                }
+                // The last depth that is not behind the bound.
+                let order = DepthOrder::Forward;
+                let key = order.key(bound as f32);
+                let key = key - u32::from(f64::from(order.depth(key)) > bound);
+                let hidden = |far: u32| plane.hidden(order, block.map(|at| at * 8), far);
+                assert!(hidden(key - 1) && !hidden(key), "{triangle:?} {block:?}");
+                within += 1;
             }
         }
+        assert!(within >= 12, "{within} blocks of 25 have a bound between the planes");
         assert_eq!(PLANE_ERROR, 16.0 * f64::EPSILON / 2.0);
     }
 
@@ -335,5 +351,56 @@ mod tests {
         assert_eq!(of([-900, -1], [0, 900]), None, "beside the image");
         assert_eq!(of([0, 900], [50 * 256, 60 * 256]), None, "below it");
         assert_eq!(of([99 * 256, 101 * 256], [49 * 256, 50 * 256]), Some(([99, 49], [99, 49])));
+    }
+    /// A triangle goes to the blocks of its box that no edge leaves out whole and that lie before what is
+    /// farthest there, and to no others; those that it reached are renewed.
+    #[test]
+    fn blocks_are_those_that_the_edges_cross() {
+        let viewport = Viewport { width: 256, height: 384 };
+        let mut image = Image::new(viewport);
+        for triangle in triangles() {
+            let wide = Wide::new(triangle, 1, viewport).expect("on the image");
+            let edges = edges(&triangle);
+            let meets = |block: usize| {
+                let place = [block % BLOCKS, block / BLOCKS].map(|at| at as i64);
+                let first = [0, 1].map(|axis| place[axis] * 8 + i64::from(ORIGIN[axis]));
+                let boxed = (0..2).all(|axis| {
+                    first[axis] + 7 >= i64::from(wide.min[axis])
+                        && first[axis] <= i64::from(wide.max[axis])
+                });
+                boxed && edges.iter().all(|edge| samples(place).any(|at| edge.at(at) >= 0))
+            };
+            let crossed: Vec<usize> = (0..BLOCKS * BLOCKS).filter(|&block| meets(block)).collect();
+            let mut record = |far: u32| {
+                // The region at ORIGIN, of two by three.
+                let mut region = image.regions().nth(5).expect("six regions");
+                assert_eq!(region.origin, ORIGIN);
+                region.far.fill(far);
+                let recorded = RefCell::new(Record::default());
+                draw(Recorder(&recorded), &wide, &mut region);
+                recorded.into_inner()
+            };
+            let Record { drawn, renewed } = record(DepthOrder::Forward.key(1.0));
+            let all = crossed.iter().map(|&block| (1, block)).collect::<Vec<_>>();
+            assert_eq!(drawn, all, "{triangle:?}");
+            assert!(crossed.len() > 5, "{}", crossed.len());
+            let even = |block: &usize| (block % BLOCKS).is_multiple_of(2);
+            assert_eq!(renewed, crossed.into_iter().filter(even).collect::<Vec<_>>());
+            let near = wide.near(DepthOrder::Forward);
+            if near > 0 {
+                assert_eq!(record(near - 1).drawn, [], "all is strictly behind");
+            }
+        }
+        // A flat one, whose plane is near its corners: at its own depth it is drawn, a float before it not.
+        let flat = triangles()[3].v.map(|v| WindowVertex { z: 0.5, ..v });
+        let wide = Wide::new(Oriented::new(flat, Faces::Both).expect("an area"), 1, viewport);
+        let wide = wide.expect("on the image");
+        for (far, draws) in [(0.5_f32, true), (0.5_f32.next_down(), false)] {
+            let mut region = image.regions().nth(5).expect("six regions");
+            region.far.fill(far.to_bits());
+            let recorded = RefCell::new(Record::default());
+            draw(Recorder(&recorded), &wide, &mut region);
+            assert_eq!(!recorded.into_inner().drawn.is_empty(), draws);
+        }
     }
 }
