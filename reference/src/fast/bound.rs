@@ -623,19 +623,20 @@ mod tests {
             assert_eq!(of(1024.5, 1044.5), Place::Outside);
         }
     }
-    /// Beyond two planes at once is outside too.
+    /// Beyond one plane, two or three.
     #[test]
-    fn beyond_two_planes_is_outside() {
+    fn beyond_any_plane_is_outside() {
         for order in ORDERS {
-            let before_near = order.range()[0] - 1.0;
-            for (x, y) in [(-3.0, 0.0), (3.0, 0.0), (0.0, -3.0), (0.0, 3.0)] {
-                let rows = [
-                    [0.0, 0.0, 0.0, x],
-                    [0.0, 0.0, 0.0, y],
-                    [0.0, 0.0, 0.0, before_near],
-                    [0.0, 0.0, 0.0, 1.0],
-                ];
-                assert_eq!(place_of(SMALL, order, rows, 0.0), Place::Outside, "{x} {y}");
+            let [near, far] = order.range();
+            for (i, z) in [near - 1.0, (near + far) * 0.5, far + 1.0].into_iter().enumerate() {
+                for (x, y) in
+                    (0..9).map(|at| ((at % 3 - 1) as f32 * 3.0, (at / 3 - 1) as f32 * 3.0))
+                {
+                    let rows = [x, y, z, 1.0].map(|offset| [0.0, 0.0, 0.0, offset]);
+                    let expected = i != 1 || x != 0.0 || y != 0.0;
+                    let place = place_of(SMALL, order, rows, 0.0);
+                    assert_eq!(place == Place::Outside, expected, "{x} {y} {z}: {place:?}");
+                }
             }
         }
     }

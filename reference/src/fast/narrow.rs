@@ -434,7 +434,10 @@ fn set_up<S: Simd>(
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::{Level, dispatch};
+
     use super::*;
+    use crate::window::{Oriented, WindowVertex, edge, top_left};
 
     /// No draw index is below it, and that of the nearest corner's depth is.
     #[test]
@@ -447,5 +450,121 @@ mod tests {
                 assert_eq!(nearest(order, z), i64::from(least) << 32);
             }
         }
+    }
+    /// Numbers that look random, below `limit`.
+    fn dice(state: &mut u64, limit: u64) -> i32 {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        ((*state >> 33) % limit) as i32
+    }
+
+    /// Triangles from tiny to as large as a narrow cluster, some without area, with samples on their edges
+    /// and corners often.
+    fn triangles(state: &mut u64, count: usize) -> Vec<[[i32; 2]; 3]> {
+        let triangle = |_| {
+            let side = [2, 300, 700, 3000, 30_000][dice(state, 5) as usize];
+            let grid = [1, 64, 128][dice(state, 3) as usize];
+            let from = [0, 1].map(|_| dice(state, 30_720 - side));
+            [0; 3].map(|_| from.map(|at| (at + dice(state, side)) / grid * grid))
+        };
+        (0..count).map(triangle).collect()
+    }
+
+    /// Columns or rows whose centres lie among the three places, within the region.
+    fn centres(at: [i32; 3], low: i32, high: i32) -> Vec<i32> {
+        let (min, max) = (at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2]));
+        (low..=high).filter(|pixel| (min..=max).contains(&(pixel * 256 + 128))).collect()
+    }
+
+    /// What is kept and what is set up, against one triangle and one sample at a time.
+    #[test]
+    fn sixteen_triangles_are_set_up_like_one() {
+        let mut state = 7;
+        let (mut kept_in_all, mut tiny_in_all, mut larger_in_all) = (0, 0, 0);
+        for round in 0..900 {
+            let count = 1 + dice(&mut state, 80) as usize;
+            let all = triangles(&mut state, count);
+            let faces = [Faces::Both, Faces::CounterClockwise][round % 2];
+            let low = [0, 1].map(|_| dice(&mut state, 60));
+            let high = [0, 1].map(|axis| low[axis] + dice(&mut state, 128));
+            let mut room = Room::new();
+            for (i, triangle) in all.iter().enumerate() {
+                for (corner, [x, y]) in triangle.iter().enumerate() {
+                    room.corners[corner][i] = (x | y << 16) as u32;
+                }
+            }
+            let boxes = |triangle: &[[i32; 2]; 3]| {
+                [0, 1].map(|axis| centres(triangle.map(|at| at[axis]), low[axis], high[axis]))
+            };
+            let kept = dispatch!(Level::new(), s => keep(s, &mut room, count, low, high));
+            let holds = |&i: &usize| boxes(&all[i]).iter().all(|pixels| !pixels.is_empty());
+            let expected: Vec<usize> = (0..count).filter(holds).collect();
+            let numbers = room.kept[3][..kept].iter().map(|&i| i as usize);
+            assert_eq!(numbers.collect::<Vec<_>>(), expected, "round {round}");
+            kept_in_all += kept;
+            for from in (0..kept).step_by(LANES) {
+                let lanes = u64::MAX >> (64 - (kept - from).min(LANES));
+                dispatch!(Level::new(), s => set_up(s, &mut room, from, lanes, faces, low, high));
+                let set_up = &room.set_up;
+                for lane in 0..LANES {
+                    // Four bits, sixteen apart, and one.
+                    let tiny = set_up.tiny >> lane & 0x0001_0001_0001_0001;
+                    let larger = set_up.larger >> lane & 1;
+                    let Some(&number) = expected.get(from + lane) else {
+                        assert_eq!((tiny, larger), (0, 0), "no triangle is in lane {lane}");
+                        continue;
+                    };
+                    let corners = all[number].map(|[x, y]| WindowVertex { x, y, z: 0.5 });
+                    let Some(triangle) = Oriented::new(corners, faces) else {
+                        assert_eq!((tiny, larger), (0, 0), "no area or no face: {corners:?}");
+                        continue;
+                    };
+                    let [columns, rows] = boxes(&all[number]);
+                    let first = [columns[0], rows[0]];
+                    let ends = |i: usize| (triangle.v[(i + 1) % 3], triangle.v[(i + 2) % 3]);
+                    let value = |i: usize, [x, y]: [i32; 2]| {
+                        let (a, b) = ends(i);
+                        edge(a, b, i64::from(x) * 256 + 128, i64::from(y) * 256 + 128)
+                    };
+                    let turned = triangle.v[1] != corners[1];
+                    assert_eq!(set_up.turned >> lane & 1 == 1, turned, "{corners:?}");
+                    assert_eq!([0, 1].map(|axis| set_up.first[axis][lane]), first);
+                    let last = [0, 1].map(|axis| set_up.last[axis][lane]);
+                    assert_eq!(
+                        last,
+                        [first[0] + columns.len() as i32 - 1, first[1] + rows.len() as i32 - 1]
+                    );
+                    for i in 0..3 {
+                        let (a, b) = ends(i);
+                        let at = i64::from(set_up.edges[i][lane]);
+                        assert_eq!(at, value(i, first), "{corners:?}");
+                        assert_eq!(set_up.bias[i][lane], i32::from(!top_left(a, b)), "{corners:?}");
+                        let right = value(i, [first[0] + 1, first[1]]) - at;
+                        let down = value(i, [first[0], first[1] + 1]) - at;
+                        let steps = [set_up.right[i][lane], set_up.down[i][lane]].map(i64::from);
+                        assert_eq!(steps, [right, down], "{corners:?}");
+                    }
+                    let is_tiny = columns.len() <= 2 && rows.len() <= 2;
+                    assert_eq!(larger == 1, !is_tiny, "{corners:?}");
+                    let covers = |which: i32| {
+                        let at = [first[0] + (which & 1), first[1] + (which >> 1)];
+                        let inside = (0..3).all(|i| {
+                            let (a, b) = ends(i);
+                            value(i, at) >= i64::from(!top_left(a, b))
+                        });
+                        is_tiny && columns.contains(&at[0]) && rows.contains(&at[1]) && inside
+                    };
+                    for which in 0..4 {
+                        let bit = set_up.tiny >> (16 * which + lane as i32) & 1 == 1;
+                        assert_eq!(bit, covers(which), "{corners:?} {which}");
+                        tiny_in_all += usize::from(bit);
+                    }
+                    larger_in_all += usize::from(!is_tiny);
+                }
+            }
+        }
+        assert!(
+            kept_in_all > 5000 && tiny_in_all > 500 && larger_in_all > 2000,
+            "{kept_in_all} {tiny_in_all} {larger_in_all} prove little"
+        );
     }
 }
