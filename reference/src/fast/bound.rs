@@ -523,12 +523,28 @@ mod tests {
     }
 
     /// What [`Projection::clusters`] says of columns and rows, in f64: how far either way from the exact
-    /// column of x/w its bounds lie.
-    fn reach(x: f64, w: f64, half: f64) -> f64 {
-        let (ex, ew) = (16.0 * U * x.abs(), 16.0 * U * w);
+    /// column of x/w its bounds lie, where x and w have these errors.
+    fn reach([x, w]: [f64; 2], [ex, ew]: [f64; 2], half: f64) -> f64 {
         let most = (x / w).abs();
         let quotient = (most * ew + ex) / (w - ew) + most * 8.0 * U;
         quotient * 2.0 * half + 6.0 * U * half + 1.0 / 256.0
+    }
+
+    /// Next to the eye w is hardly more than its error, and the divisor is what is left of it.
+    #[test]
+    fn pixels_reach_farther_next_to_the_eye() {
+        // w is a difference of numbers of 1, 40 units of 2⁻²⁴; x is a tenth of it.
+        let (t, x) = (1.0 + 40.0 * U, 4.0 * U);
+        let z = U / 4.0;
+        let rows = [[0.0, x], [0.0, 0.0], [0.0, z], [1.0, -1.0]];
+        let rows = rows.map(|[slope, offset]| [slope as f32, 0.0, 0.0, offset as f32]);
+        let margin = reach([x, 40.0 * U], [16.0 * U * x, 16.0 * U * (t + 1.0)], 32.0);
+        assert!((25.0..28.0).contains(&margin), "{margin}");
+        let column = 32.0 + 3.2;
+        let place = place_of(SMALL, DepthOrder::Forward, rows, t as f32);
+        let Place::Narrow { min, max, .. } = place else { panic!("{place:?}") };
+        let expected = [(column - margin).floor(), (column + margin).floor()];
+        assert_eq!([min[0], max[0]].map(f64::from), expected);
     }
 
     /// A pixel more begins where the margin reaches over its edge.
@@ -550,7 +566,8 @@ mod tests {
                     let off = 0.02 + f64::from(step) * 0.000_5;
                     let x = at(if side == 0 { edge + off } else { edge - off }) as f32;
                     let exact = f64::from(x) / w * half + half;
-                    let margin = reach(f64::from(x), w, half);
+                    let errors = [16.0 * U * f64::from(x).abs(), 16.0 * U * w];
+                    let margin = reach([f64::from(x), w], errors, half);
                     let ends = [exact - margin, exact + margin];
                     // The bound's own additions round to 2⁻¹⁴ pixels there.
                     if (ends[side] - edge).abs() < 2.0 / 16_384.0 {
