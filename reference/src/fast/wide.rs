@@ -225,7 +225,8 @@ mod tests {
 
     const ORIGIN: [i32; 2] = [128, 256];
 
-    /// Triangles over the region at [`ORIGIN`], in pixels from it, whose planes rise and fall along both axes.
+    /// Triangles over the region at [`ORIGIN`], in pixels from it, whose planes rise and fall along both axes;
+    /// each beginning at each of its corners.
     fn triangles() -> Vec<Oriented> {
         let at = |[x, y, z]: [f32; 3]| WindowVertex {
             x: (x * 256.0) as i32 + ORIGIN[0] * 256,
@@ -238,8 +239,11 @@ mod tests {
             [[60.1, 140.0, 0.2], [-40.0, -30.0, 0.8], [140.0, 20.0, 0.7]],
             [[-300.0, -70.0, 0.0], [40.0, 900.0, 1.0], [700.0, -60.0, 0.4]],
             [[3.0, 4.0, 0.25], [90.0, 8.0, 0.5], [50.0, 100.0, 0.25]],
+            // Blunt: beyond its third corner two edges leave out what is still in its box.
+            [[3.0, 4.0, 0.25], [120.0, 110.0, 0.5], [75.0, 40.0, 0.4]],
         ]
         .into_iter()
+        .flat_map(|[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]])
         .map(|corners| Oriented::new(corners.map(at), Faces::Both).expect("an area"))
         .collect()
     }
@@ -314,7 +318,7 @@ mod tests {
                 within += 1;
             }
         }
-        assert!(within >= 12, "{within} blocks of 25 have a bound between the planes");
+        assert!(within >= 36, "{within} blocks of 90 have a bound between the planes");
         assert_eq!(PLANE_ERROR, 16.0 * f64::EPSILON / 2.0);
     }
 
@@ -392,7 +396,7 @@ mod tests {
             }
         }
         // A flat one, whose plane is near its corners: at its own depth it is drawn, a float before it not.
-        let flat = triangles()[3].v.map(|v| WindowVertex { z: 0.5, ..v });
+        let flat = triangles()[9].v.map(|v| WindowVertex { z: 0.5, ..v });
         let wide = Wide::new(Oriented::new(flat, Faces::Both).expect("an area"), 1, viewport);
         let wide = wide.expect("on the image");
         for (far, draws) in [(0.5_f32, true), (0.5_f32.next_down(), false)] {
