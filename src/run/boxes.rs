@@ -56,8 +56,11 @@ impl Boxes {
             }
             new
         };
-        let new: Vec<Vec<(ObjectId, Aabb)>> =
-            world.moving().par_chunks(AT_A_TIME).map(place).collect();
+        // What one thread does at a time is not worth another thread's attention.
+        let new: Vec<Vec<(ObjectId, Aabb)>> = match world.moving() {
+            few if few.len() <= AT_A_TIME => vec![place(few)],
+            many => many.par_chunks(AT_A_TIME).map(place).collect(),
+        };
         self.moved.clear();
         for (id, bounds) in new.into_iter().flatten() {
             self.boxes[id.0 as usize] = bounds;

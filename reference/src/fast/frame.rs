@@ -80,7 +80,12 @@ impl<'a> Frame<'a> {
             }
             task
         };
-        let tasks: Vec<Task<'_>> = names.par_chunks(UNITS_PER_TASK).map(project).collect();
+        // One task's share is not worth another thread's attention.
+        let tasks: Vec<Task<'_>> = if names.len() <= UNITS_PER_TASK {
+            vec![project(names)]
+        } else {
+            names.par_chunks(UNITS_PER_TASK).map(project).collect()
+        };
         let half = [viewport.width as f32 * 0.5, viewport.height as f32 * 0.5];
         let mut frame = Self {
             instances,
@@ -97,6 +102,11 @@ impl<'a> Frame<'a> {
             frame.lists.push(task.lists);
         }
         (frame, work)
+    }
+
+    /// Clusters of all units.
+    pub(crate) fn clusters(&self) -> usize {
+        self.lists.iter().map(|list| list.places.len()).sum()
     }
 
     /// One a cluster of the unit.
