@@ -470,19 +470,28 @@ mod tests {
         }
     }
 
+    /// How many of 29 steps from 1 the point is narrow, which is where `expected` says so.
+    fn narrow_steps(
+        order: DepthOrder,
+        rows: [[f32; 4]; 4],
+        step: f64,
+        expected: impl Fn(f64) -> bool,
+    ) -> usize {
+        let is_narrow = |&i: &i32| {
+            let t = 1.0 + f64::from(i) * step;
+            let place = place_of(SMALL, order, rows, t as f32);
+            let is = matches!(place, Place::Narrow { .. });
+            assert_eq!(is, expected(t), "{order:?} {rows:?} {i}: {place:?}");
+            is
+        };
+        (1..30).filter(is_narrow).count()
+    }
+
     /// At the error of a distance within near and far a cluster is narrow, short of it wide.
     #[test]
     fn narrow_begins_at_its_margin() {
-        for (order, plane, rows) in planes().filter(|&(_, plane, _)| plane < 2) {
-            let mut narrow = 0;
-            for step in 1..30 {
-                let t = 1.0 - f64::from(step) * 2.0 * U;
-                let expected = 1.0 - t >= 16.0 * U * (1.0 + t);
-                let place = place_of(SMALL, order, rows, t as f32);
-                let is = matches!(place, Place::Narrow { .. });
-                assert_eq!(is, expected, "{order:?} {plane} {step}: {place:?}");
-                narrow += u32::from(expected);
-            }
+        for (order, _, rows) in planes().filter(|&(_, plane, _)| plane < 2) {
+            let narrow = narrow_steps(order, rows, -2.0 * U, |t| 1.0 - t >= 16.0 * U * (1.0 + t));
             assert_eq!(narrow, 14, "the margin is at step 16");
         }
     }
@@ -493,15 +502,7 @@ mod tests {
         for order in ORDERS {
             let z = (U / 2.0) as f32 * if order == DepthOrder::Forward { 1.0 } else { -1.0 };
             let rows = [[0.0; 4], [0.0; 4], [0.0, 0.0, 0.0, z], [1.0, 0.0, 0.0, -1.0]];
-            let mut narrow = 0;
-            for step in 1..30 {
-                let t = 1.0 + f64::from(step) * 2.0 * U;
-                let expected = t - 1.0 > 16.0 * U * (1.0 + t);
-                let place = place_of(SMALL, order, rows, t as f32);
-                let is = matches!(place, Place::Narrow { .. });
-                assert_eq!(is, expected, "{order:?} {step}: {place:?}");
-                narrow += u32::from(expected);
-            }
+            let narrow = narrow_steps(order, rows, 2.0 * U, |t| t - 1.0 > 16.0 * U * (1.0 + t));
             assert_eq!(narrow, 13, "the margin is between steps 16 and 17");
         }
     }
@@ -509,8 +510,10 @@ mod tests {
     /// Terms that are all zero err as denormals may; terms that may overflow err by anything.
     #[test]
     fn the_smallest_and_the_largest_sums_have_a_margin() {
-        let w = |w: f32, z: f32| [[0.0; 4], [0.0; 4], [0.0, 0.0, 0.0, z], [0.0, 0.0, 0.0, w]];
-        let of = |w_: f32, z: f32| place_of(SMALL, DepthOrder::Forward, w(w_, z), 0.0);
+        let of = |w: f32, z: f32| {
+            let rows = [0.0, 0.0, z, w].map(|offset| [0.0, 0.0, 0.0, offset]);
+            place_of(SMALL, DepthOrder::Forward, rows, 0.0)
+        };
         assert_eq!(of(1.0, 0.0), Place::Wide, "on the near plane");
         let step = f32::MIN_POSITIVE;
         assert_eq!(of(1.0, step), Place::Wide, "less than the error before it");
@@ -640,6 +643,7 @@ mod tests {
             assert_eq!(of(1024.5, 1044.5), Place::Outside);
         }
     }
+
     /// Beyond one plane, two or three.
     #[test]
     fn beyond_any_plane_is_outside() {

@@ -451,6 +451,7 @@ mod tests {
             }
         }
     }
+
     /// Numbers that look random, below `limit`.
     fn dice(state: &mut u64, limit: u64) -> i32 {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
