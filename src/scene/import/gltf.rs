@@ -20,9 +20,21 @@ use crate::scene::Mesh;
 /// one mesh, and any number of primitives one accessor: a small file could ask for all memory there is.
 const MOST_VERTICES: usize = 1 << 27;
 
+/// Bytes of a binary file's header: magic, version, and the length of the whole file with it (glTF 2.0, 4.4.2).
+const HEADER: u32 = 12;
+
 /// Reads the buffers beside the file as well, where there is a folder to look in.
 pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Vec<Mesh>, String> {
     let said = |error: gltf::Error| format!("not a glTF file that can be read: {error}");
+    // The crate takes the header off this length unasked, and panics where overflow is checked.
+    if let [b'g', b'l', b'T', b'F', _, _, _, _, a, b, c, d, ..] = *bytes {
+        let length = u32::from_le_bytes([a, b, c, d]);
+        if length < HEADER {
+            return Err(format!(
+                "its header says {length} bytes in all, and is {HEADER} itself; export it again"
+            ));
+        }
+    }
     let Gltf { document, mut blob } = Gltf::from_slice_without_validation(bytes).map_err(said)?;
     // The crate's own checks take this one for granted, and panic.
     let root = document.into_json();
@@ -250,6 +262,21 @@ mod tests {
         assert_eq!(meshes.len(), 1);
         assert_eq!(meshes[0].positions()[1], [7.0, 0.0, 0.0]);
         assert_eq!(meshes[0].triangles(), [[0, 1, 2]]);
+    }
+
+    /// A length under the header's own, at it, and over what is there: none is taken off unasked.
+    #[test]
+    fn binary_lengths_are_not_trusted() {
+        let of = |length: u32| {
+            let bytes =
+                [&b"glTF\x02\0\0\0"[..], &length.to_le_bytes(), b"\x02\0\0\0JSON{}"].concat();
+            parse(&bytes, None).unwrap_err()
+        };
+        assert_eq!(of(11), "its header says 11 bytes in all, and is 12 itself; export it again");
+        assert!(of(0).starts_with("its header says 0 bytes in all"));
+        for length in [12, 22, 23, u32::MAX] {
+            assert!(of(length).starts_with("not a glTF file that can be read: "), "{length}");
+        }
     }
 
     #[test]
