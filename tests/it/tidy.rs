@@ -1,6 +1,7 @@
 //! The borders of the house, held: imports only from rooms above, module docs, file length, banned
 //! words.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Rooms from the top; a room may import only those before it.
@@ -120,4 +121,45 @@ fn nothing_compared_sees_a_clock_or_hash_order() {
             assert!(!clock, "{} reads the clock", path.display());
         }
     }
+}
+
+/// What is fuzzed is what ships: the fuzzers' own lock file has the versions of ours.
+#[test]
+fn fuzzers_lock_what_ships() {
+    let read = |path: &str| -> toml::Table {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+        std::fs::read_to_string(path).unwrap().parse().unwrap()
+    };
+    let text = |value: &toml::Value| value.as_str().unwrap().to_owned();
+    let packages = |lock: &toml::Table| -> BTreeMap<String, Vec<toml::Value>> {
+        let mut versions: BTreeMap<_, Vec<_>> = BTreeMap::new();
+        for package in lock["package"].as_array().unwrap() {
+            versions.entry(text(&package["name"])).or_default().push(package.clone());
+        }
+        versions
+    };
+    let (ours, theirs) = (packages(&read("Cargo.lock")), packages(&read("fuzz/Cargo.lock")));
+    for (name, packages) in &theirs {
+        let Some(known) = ours.get(name) else { continue };
+        for package in packages {
+            let version = &package["version"];
+            assert!(
+                known.iter().any(|ours| ours["version"] == *version),
+                "{name} {version} is not what Cargo.lock has: in fuzz/, `cargo update -p {name} --precise ...`"
+            );
+        }
+    }
+    let manifest = read("Cargo.toml");
+    let wanted: Vec<String> = manifest["dependencies"]
+        .as_table()
+        .unwrap()
+        .iter()
+        .filter(|(_, one)| one.get("optional").is_none())
+        .map(|(name, _)| name.clone())
+        .collect();
+    // With a version behind it where there are several.
+    let name = |one: &toml::Value| text(one).split(' ').next().unwrap_or_default().to_owned();
+    let locked: Vec<String> =
+        theirs["plainsight"][0]["dependencies"].as_array().unwrap().iter().map(name).collect();
+    assert_eq!(locked, wanted, "run `cargo update --workspace` in fuzz/");
 }
