@@ -34,21 +34,23 @@ pub(super) fn model(format: Format, bytes: &[u8]) {
     }
 }
 
-/// Reads `bytes` as what a culler of another engine drew in two frames of two views of nine parts.
+/// Reads `bytes` as what a culler of another engine drew.
 pub(super) fn drawn(bytes: &[u8]) {
-    let mut drawn = Drawn::new(bytes, "drawn.jsonl");
-    let mut all = || -> Result<(), ForeignError> {
-        let name = drawn.header()?;
-        assert!(!name.chars().any(char::is_control));
-        for (frame, view) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let parts = drawn.at(Moment { frame, view }, 9)?;
-            assert!(parts.iter().all(|part| part.0 < 9));
-        }
-        drawn.end()
-    };
-    if let Err(error) = all() {
+    if let Err(error) = drawn_whole(bytes) {
         one_line(&error.to_string());
     }
+}
+
+/// Reads all of `bytes` as what a culler of another engine drew in two frames of two views of nine parts.
+pub(super) fn drawn_whole(bytes: &[u8]) -> Result<(), ForeignError> {
+    let mut drawn = Drawn::new(bytes, "drawn.jsonl");
+    let name = drawn.header()?;
+    assert!(!name.chars().any(char::is_control));
+    for (frame, view) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        let parts = drawn.at(Moment { frame, view }, 9)?;
+        assert!(parts.iter().all(|part| part.0 < 9));
+    }
+    drawn.end()
 }
 
 /// Reads `bytes` as a scene file.

@@ -28,10 +28,11 @@ fn corpus(kind: &str) -> Vec<(String, Vec<u8>)> {
     files
 }
 
-/// Those of them that hold what their format is for.
+/// Those of them that hold what their format is for, and are read whole.
 fn good(kind: &str) -> Vec<(String, Vec<u8>)> {
     let mut files = corpus(kind);
     files.retain(|(name, _)| name.starts_with("good"));
+    assert!(!files.is_empty(), "no file of {kind} is good");
     files
 }
 
@@ -99,7 +100,11 @@ fn the_good_files_are_good() {
     for (name, good) in good("scene") {
         let (text, path) = (String::from_utf8(good).unwrap(), Path::new(&name));
         let scene = file::parse(&text, path, &Knobs::default()).unwrap();
-        assert_eq!(scene.objects.len(), 1, "{name}");
+        let said = format!("leaf_triangles = {}\n", scene.leaf_triangles);
+        assert!(scene.objects.len() == 1 && text.contains(&said), "{name}");
+    }
+    for (name, good) in good("drawn") {
+        reader::drawn_whole(&good).unwrap_or_else(|e| panic!("{name}: {e}"));
     }
 }
 
