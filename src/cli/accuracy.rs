@@ -4,18 +4,22 @@ use std::cell::RefCell;
 use std::path::PathBuf;
 
 use clap::Args;
+use indicatif::ProgressBar;
 use serde_json::{Value, json};
 
 use super::args::SceneArgs;
-use super::compare::folder;
+use super::files::Files;
 use super::progress::{counting_triangles, progress_bar};
-use super::run::{Named, catch_interrupt, interrupted, matching, pick_cache, pick_cost};
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use super::run::{Named, matching, pick_cache, pick_cost};
+use super::signals::{catch_interrupt, interrupted, stoppable};
+use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Outputs, Streams};
 use crate::accuracy::{
-    EffectPoint, KNOBS, Point, RendererPoint, Worlds, effects, findings, measure, renderers,
-    settings,
+    EffectPoint, KNOBS, Point, RendererPoint, Setting, Worlds, effects, findings, measure,
+    renderers, settings,
 };
 use crate::effect::EFFECTS;
+use crate::oracle::CostModel;
+use crate::part::Cache;
 use crate::report::{
     accuracy_chart, accuracy_table, effect_table, picture_png, renderer_table, wrapped,
 };
@@ -61,6 +65,10 @@ pub(super) struct AccuracyArgs {
 }
 
 impl AccuracyArgs {
+    pub(super) fn files(&self) -> Files {
+        Files::of_scenes(&self.scene, &self.scene_args)
+    }
+
     /// The scenes, in the quick size unless the user wants another.
     fn scenes(&self) -> Result<Vec<Scene>, CliError> {
         let names: Vec<&str> = match self.scene.is_empty() {
@@ -96,7 +104,23 @@ struct Figures {
     effects: Vec<EffectPoint>,
 }
 
-pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+/// Names for files about scenes: each scene's own, with a number where two are called alike.
+fn stems(scenes: &[Scene]) -> Vec<String> {
+    let mut stems: Vec<String> = Vec::new();
+    for scene in scenes {
+        let stem = scene.name.replace(|c: char| !(c.is_alphanumeric() || "._-".contains(c)), "_");
+        let numbered = (2..).map(|number| format!("{stem}-{number}"));
+        let mut names = std::iter::once(stem.clone()).chain(numbered);
+        stems.extend(names.find(|name| !stems.contains(name)));
+    }
+    stems
+}
+
+pub(super) fn accuracy(
+    args: &AccuracyArgs,
+    outputs: &mut Outputs<'_>,
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
     if args.list {
         for knob in KNOBS {
             let values: Vec<&str> = knob.values.iter().map(|value| value.0).collect();
@@ -108,7 +132,13 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
     let settings = settings(&args.knob).map_err(CliError::Usage)?;
     let (cost, cache) = (pick_cost(&args.scene_args)?, pick_cache(&args.scene_args)?);
     let scenes = args.scenes()?;
-    let out = folder(&args.out)?;
+    let out = outputs.folder("--out", &args.out)?;
+    let mut lines = out.file(outputs, "points.jsonl")?;
+    let findings = out.file(outputs, "findings.md")?;
+    let mut file = |stem: &str, kind| out.file(outputs, &format!("{stem}.{kind}"));
+    let charts =
+        stems(&scenes).into_iter().map(|stem| Ok([file(&stem, "svg")?, file(&stem, "png")?]));
+    let charts = charts.collect::<Result<Vec<[OutFile<'_>; 2]>, CliError>>()?;
     catch_interrupt();
     let bar = progress_bar();
     let rounds = u64::from(args.rounds);
@@ -120,49 +150,29 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
         (shots(scene) * (settings.len() + variants) as u64 + RENDERINGS) * rounds
     };
     bar.set_length(scenes.iter().map(of_scene).sum());
-    let mut lines: Vec<String> = Vec::new();
     let mut words = format!("# What accuracy costs in time\n\nCost model: {}.\n", cost.name);
-    let mut failed = false;
-    for scene in &scenes {
-        bar.set_message(scene.name.clone());
-        let mut tick = || {
-            bar.inc(1);
-            !interrupted()
-        };
-        let warnings = RefCell::new(Vec::new());
-        let make = |scene: Scene, knobs| {
-            let name = scene.name.clone();
-            let world = counting_triangles(&bar, format!("{name}: object trees"), |progress| {
-                World::make(scene, knobs, cache.as_ref(), progress)
-            });
-            warnings.borrow_mut().extend(world.made.warnings.iter().cloned());
-            bar.set_message(name);
-            world
-        };
-        let worlds = Worlds::new(scene.clone(), &make);
-        let points = measure(&worlds, &cost, args.rounds, &settings, &mut tick)?;
-        let renderers = renderers(&worlds, args.rounds, &mut tick);
-        if interrupted() {
-            return Err(RunError::Interrupted.into());
-        }
-        let effects = effects(&worlds, &cost, args.rounds, &mut tick)?;
-        for line in warnings.take() {
-            bar.suspend(|| writeln!(streams.talk, "WARNING: {line}"))?;
-        }
-        let figures = Figures { points, renderers, effects };
+    let (mut failed, mut done) = (false, 0);
+    let ended = scenes.iter().zip(charts).try_for_each(|(scene, [svg, png])| {
+        let plan =
+            Plan { cost: &cost, settings: &settings, cache: cache.as_ref(), rounds: args.rounds };
+        let figures = stoppable(|| plan.measure(scene, &bar, streams))??;
         failed |= bar.suspend(|| tell(args, scene, &figures, &mut words, streams))?;
-        lines.extend(figures.points.iter().map(|point| line("accuracy", point)));
-        lines.extend(figures.renderers.iter().map(|point| line("accuracy renderer", point)));
-        lines.extend(figures.effects.iter().map(|point| line("accuracy effects", point)));
-        let chart = accuracy_chart(&figures.points);
-        let stem = scene.name.replace(|c: char| !(c.is_alphanumeric() || "._-".contains(c)), "_");
-        let path = |kind: &str| out.join(format!("{stem}.{kind}"));
-        OutFile::create(&path("svg"))?.finish(chart.svg().as_bytes())?;
-        OutFile::create(&path("png"))?.finish(&picture_png(&chart.png()))?;
-    }
+        let Figures { points, renderers, effects } = &figures;
+        points.iter().try_for_each(|point| lines.line(&line("accuracy", point)))?;
+        renderers.iter().try_for_each(|point| lines.line(&line("accuracy renderer", point)))?;
+        effects.iter().try_for_each(|point| lines.line(&line("accuracy effects", point)))?;
+        let chart = accuracy_chart(points);
+        svg.finish(chart.svg().as_bytes())?;
+        png.finish(&picture_png(&chart.png()))?;
+        done += 1;
+        Ok::<(), CliError>(())
+    });
     bar.finish_and_clear();
-    OutFile::create(&out.join("points.jsonl"))?.finish((lines.join("\n") + "\n").as_bytes())?;
-    OutFile::create(&out.join("findings.md"))?.finish(words.as_bytes())?;
+    if ended.is_ok() || done > 0 {
+        lines.finish(&[])?;
+        findings.finish(words.as_bytes())?;
+    }
+    ended?;
     let to = if args.json { &mut streams.talk } else { &mut streams.out };
     let word = if failed { "FAILED: a setting that takes nothing lost something" } else { "held" };
     let seconds = bar.elapsed().as_secs_f64();
@@ -171,9 +181,54 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
         "verdict: {word}; {} settings of {} scenes in {seconds:.1} s; charts, points and findings in {}",
         settings.len(),
         scenes.len(),
-        out.display()
+        out.path().display()
     )?;
     Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
+}
+
+/// What stays the same from scene to scene.
+struct Plan<'a> {
+    cost: &'a CostModel,
+    settings: &'a [Setting],
+    cache: Option<&'a Cache>,
+    rounds: u32,
+}
+
+impl Plan<'_> {
+    /// Runs every setting over a scene. It may be unwound by a signal, as [`stoppable`] says.
+    fn measure(
+        &self,
+        scene: &Scene,
+        bar: &ProgressBar,
+        streams: &mut Streams<'_>,
+    ) -> Result<Figures, CliError> {
+        bar.set_message(scene.name.clone());
+        let mut tick = || {
+            bar.inc(1);
+            !interrupted()
+        };
+        let warnings = RefCell::new(Vec::new());
+        let make = |scene: Scene, knobs| {
+            let name = scene.name.clone();
+            let world = counting_triangles(bar, format!("{name}: object trees"), |progress| {
+                World::make(scene, knobs, self.cache, progress)
+            });
+            warnings.borrow_mut().extend(world.made.warnings.iter().cloned());
+            bar.set_message(name);
+            world
+        };
+        let worlds = Worlds::new(scene.clone(), &make);
+        let points = measure(&worlds, self.cost, self.rounds, self.settings, &mut tick)?;
+        let renderers = renderers(&worlds, self.rounds, &mut tick);
+        if interrupted() {
+            return Err(RunError::Interrupted.into());
+        }
+        let effects = effects(&worlds, self.cost, self.rounds, &mut tick)?;
+        for line in warnings.take() {
+            bar.suspend(|| writeln!(streams.talk, "WARNING: {line}"))?;
+        }
+        Ok(Figures { points, renderers, effects })
+    }
 }
 
 /// The tables of a scene and its findings; whether a sound setting lost anything.

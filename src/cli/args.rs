@@ -8,6 +8,7 @@ use plainsight_reference::fast::{Options, SimdLevel};
 use super::accuracy::AccuracyArgs;
 use super::export::ExportArgs;
 use super::faults::FaultsArgs;
+use super::files::Files;
 use super::judge::JudgeArgs;
 use super::report::ReportArgs;
 use super::stress::StressArgs;
@@ -27,7 +28,9 @@ use crate::scene::{DepthOrder, Scene, Viewport};
     version,
     about,
     after_help = "Exit codes: 0 all held, 1 a check \
-failed, 2 bad usage or input, 3 a device was lost or missing where one was required."
+failed, 2 bad usage or input, 3 a device was lost or missing where one was required; 130, 143 and 129 stopped \
+by Ctrl-C, SIGTERM and SIGHUP, what was finished is written; 141 the reader of the results went away. \
+`-` as an output file is standard output."
 )]
 pub(super) struct Cli {
     #[command(subcommand)]
@@ -178,11 +181,11 @@ pub(super) struct RunArgs {
     /// One JSON object a line on standard output in place of the table.
     #[arg(long)]
     pub(super) json: bool,
-    /// Also write the JSON lines to this file.
-    #[arg(long, value_name = "FILE")]
+    /// Also write the JSON lines to this file; `-` is standard output, and the table goes to standard error.
+    #[arg(long, value_name = "FILE|-")]
     pub(super) out: Option<PathBuf>,
-    /// Also write the results as JUnit XML to this file.
-    #[arg(long, value_name = "FILE.xml")]
+    /// Also write the results as JUnit XML to this file, or to standard output for `-`.
+    #[arg(long, value_name = "FILE.xml|-")]
     pub(super) junit: Option<PathBuf>,
 }
 
@@ -269,8 +272,8 @@ pub(super) struct PictureArgs {
     /// What to draw.
     #[arg(long, value_enum, default_value_t = Layer::Parts)]
     pub(super) layer: Layer,
-    /// The PNG file (default: SCENE-FRAME-LAYER.png).
-    #[arg(long, value_name = "FILE.png")]
+    /// The PNG file (default: SCENE-FRAME-LAYER.png), or `-` for standard output.
+    #[arg(long, value_name = "FILE.png|-")]
     pub(super) out: Option<PathBuf>,
 }
 
@@ -296,8 +299,9 @@ pub(super) struct CalibrateArgs {
     /// One JSON object on standard output in place of the table.
     #[arg(long)]
     pub(super) json: bool,
-    /// The calibration file; its stem becomes the model's name.
-    #[arg(long, value_name = "FILE.toml", default_value = "calibration.toml")]
+    /// The calibration file; its stem becomes the model's name. `-` is standard output, and the table goes
+    /// to standard error.
+    #[arg(long, value_name = "FILE.toml|-", default_value = "calibration.toml")]
     pub(super) out: PathBuf,
 }
 
@@ -364,6 +368,36 @@ impl From<ProxyArg> for ProxyKind {
             ProxyArg::Hull => Self::Hull,
             ProxyArg::Box => Self::Box,
         }
+    }
+}
+
+impl RunArgs {
+    pub(super) fn files(&self) -> Files {
+        Files::of_scenes(&self.scene, &self.scene_args)
+            .writing("--out", self.out.as_deref())
+            .writing("--junit", self.junit.as_deref())
+            .json(self.json)
+    }
+}
+
+impl CompareArgs {
+    pub(super) fn files(&self) -> Files {
+        Files::of_scenes(&self.scene, &self.scene_args)
+    }
+}
+
+impl PictureArgs {
+    pub(super) fn files(&self) -> Files {
+        Files::of_scenes(std::slice::from_ref(&self.scene), &self.scene_args)
+            .writing("--out", self.out.as_deref())
+    }
+}
+
+impl CalibrateArgs {
+    pub(super) fn files(&self) -> Files {
+        Files::of_scenes(std::slice::from_ref(&self.scene), &self.scene_args)
+            .writing("--out", Some(&self.out))
+            .json(self.json)
     }
 }
 

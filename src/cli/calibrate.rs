@@ -5,10 +5,10 @@ use serde_json::json;
 
 use super::args::{CalibrateArgs, PartsArg, ProxyArg, SceneArgs};
 use super::progress::progress_bar;
-use super::run::{
-    Named, Oracles, StagedOracles, catch_interrupt, interrupted, pick_cache, pick_index,
-};
-use super::{CliError, EXIT_HELD, OutFile, Streams};
+use super::run::{Named, Oracles, StagedOracles, pick_cache, pick_index};
+use super::signals::{catch_interrupt, interrupted};
+use super::target::is_stream;
+use super::{CliError, EXIT_HELD, Outputs, Streams};
 use crate::oracle::{CostModel, FitError, Measurement};
 use crate::run::{Bench, World, frames_to_measure, measure, workloads};
 
@@ -33,7 +33,11 @@ fn refused(args: &CalibrateArgs) -> Option<String> {
     (scene.cost != "lavapipe").then(|| "--cost: a model is written here, none is read".to_owned())
 }
 
-pub(super) fn calibrate(args: &CalibrateArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+pub(super) fn calibrate(
+    args: &CalibrateArgs,
+    outputs: &mut Outputs<'_>,
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
     let name = std::slice::from_ref(&args.oracle);
     Oracles::known(name)?;
     if let Some(what) = refused(args) {
@@ -42,7 +46,7 @@ pub(super) fn calibrate(args: &CalibrateArgs, streams: &mut Streams<'_>) -> Resu
     // The index decides nothing here, but a misspelt one is not passed over.
     pick_index(&args.scene_args.index)?;
     let named = Named::open(&args.scene, &args.scene_args)?;
-    let out = OutFile::create(&args.out)?;
+    let out = outputs.file("--out", &args.out)?;
     let oracles = Oracles::open(name, args.scene_args.adapter.as_deref(), streams)?;
     catch_interrupt();
     let bar = progress_bar();
@@ -132,7 +136,8 @@ fn fitted(
     device: &str,
     measurements: &[Measurement],
 ) -> CostModel {
-    let name = args.out.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stem = args.out.file_stem().filter(|_| !is_stream(&args.out));
+    let name = stem.map_or("calibration".into(), |stem| stem.to_string_lossy()).into_owned();
     let model = CostModel::fitted(name, String::new(), measurements);
     let error = model.error_over(measurements);
     let source = format!(
@@ -191,6 +196,10 @@ fn tell(
         error.median * 100.0,
         error.p95 * 100.0,
     )?;
-    writeln!(streams.out, "written: {0}; use it by --cost {0}", args.out.display())?;
+    if is_stream(&args.out) {
+        writeln!(streams.out, "written to standard output; use it as a file, by --cost FILE.toml")?;
+    } else {
+        writeln!(streams.out, "written: {0}; use it by --cost {0}", args.out.display())?;
+    }
     Ok(())
 }

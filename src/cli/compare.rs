@@ -1,19 +1,20 @@
 //! `compare`: cullers on the same frames, beside Table 1 and Figures 6 to 9 of the paper.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::args::{CompareArgs, SceneArgs};
 use super::progress::progress_bar;
 use super::run::{
-    Finished, Named, Oracles, Plan, REPEAT, catch_interrupt, matching, pick_cache, pick_cost,
-    pick_cullers, pick_index, tell_failures,
+    Finished, Named, Oracles, Plan, REPEAT, matching, pick_cache, pick_cost, pick_cullers,
+    pick_index, tell_failures,
 };
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use super::signals::catch_interrupt;
+use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Outputs, Streams};
 use crate::cull::CullerKind;
 use crate::oracle::CostModel;
 use crate::part::Made;
 use crate::report::{Comparison, picture_png, wrapped};
-use crate::run::{FrameState, Moment, Repeat, Trace, depth_complexity};
+use crate::run::{FrameState, Moment, Repeat, Trace, World, depth_complexity};
 
 /// The scenes of the paper.
 const SCENES: [&str; 2] = ["powerplant", "bunnies"];
@@ -78,16 +79,13 @@ fn label(name: &str, named: &Named, args: &SceneArgs) -> String {
     label.replace(|c: char| !(c.is_alphanumeric() || "._-".contains(c)), "_")
 }
 
-/// The folder, made if it is not there.
-pub(super) fn folder(path: &Path) -> Result<PathBuf, CliError> {
-    std::fs::create_dir_all(path)
-        .map_err(|source| CliError::Write { path: path.display().to_string(), source })?;
-    Ok(path.to_owned())
-}
+/// The figures of a case: SVG and PNG of each.
+type Figures<'a> = Vec<[OutFile<'a>; 2]>;
 
 pub(super) fn compare(
     args: &CompareArgs,
     cullers: &[CullerKind],
+    outputs: &mut Outputs<'_>,
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
     let names: Vec<String> = if args.culler.is_empty() {
@@ -100,11 +98,18 @@ pub(super) fn compare(
     Oracles::known(&args.oracle)?;
     let cost = pick_cost(&args.scene_args)?;
     let cases = cases(args)?;
+    let out = outputs.folder("--out", &args.out)?;
+    let mut csv = Csv { file: out.file(outputs, "series.csv")?, begun: false };
+    let mut files: Vec<Figures<'_>> = Vec::new();
+    for case in &cases {
+        let mut file = |stem, kind| out.file(outputs, &format!("{}-{stem}.{kind}", case.label));
+        let figures = Comparison::CHARTS.map(|stem| Ok([file(stem, "svg")?, file(stem, "png")?]));
+        files.push(figures.into_iter().collect::<Result<_, CliError>>()?);
+    }
     let cache = pick_cache(&args.scene_args)?;
     let adapter = args.scene_args.adapter.as_deref();
     let oracles =
         Oracles::open(&args.oracle, adapter, streams)?.simulating(&cost, &args.scene_args);
-    let out = folder(&args.out)?;
     let repeat = match args.rounds {
         1 => REPEAT,
         rounds => Repeat { frames: u32::MAX, rounds: rounds - 1 },
@@ -113,46 +118,63 @@ pub(super) fn compare(
     let mut plan = Plan { cullers, index, oracles, cost, cache, repeat, with_bound, args: args_of };
     catch_interrupt();
     let bar = progress_bar();
-    let (mut failed, mut csv) = (false, String::new());
-    for case in &cases {
+    let (mut failed, mut done) = (false, 0);
+    let ended = cases.iter().zip(files).try_for_each(|(case, figures)| {
         plan.args = &case.args;
         let finished = plan.run_after(&case.named, &bar, streams, &mut |world, streams| {
-            let state = FrameState::at(world, Moment { frame: world.scene.frames / 2, view: 0 });
-            let complexity = depth_complexity(world, &state);
-            let line = format!(
-                "{}: {} objects, {} moving, {} triangles, {} after the cut, {} parts (at most {} triangles each), {} frames; depth complexity {complexity:.1} in the middle frame; {} in {:.1} s{}",
-                case.label,
-                world.partition.object_count(),
-                world.moving_count(),
-                world.scene.triangle_count(),
-                world.partition.fragment_count(),
-                world.partition.part_count(),
-                case.args.leaf_triangles(&world.scene),
-                world.scene.frames,
-                how_made(&world.made),
-                world.build_seconds,
-                peak_memory()
-            );
+            let line = about(case, world);
             // Before any culler is measured, so that nobody can have chosen it by the outcome.
             let to = if args.json { &mut streams.talk } else { &mut streams.out };
             let width = streams.width.filter(|_| !args.json);
             writeln!(to, "{}", wrapped(&line, width))
-        });
-        if finished.is_err() {
-            bar.finish_and_clear();
-            // Takes away nothing but an empty folder.
-            let _ = std::fs::remove_dir(&out);
-        }
-        let finished = finished?;
-        failed |=
-            tell_case(case, &finished, &plan.cost, (&out, &mut csv, args.json), streams, &bar)?;
-    }
+        })?;
+        let to = (figures, &mut csv, args.json);
+        failed |= tell_case(case, &finished, &plan.cost, to, streams, &bar)?;
+        done += 1;
+        Ok::<(), CliError>(())
+    });
     bar.finish_and_clear();
-    OutFile::create(&out.join("series.csv"))?.finish(csv.as_bytes())?;
+    if ended.is_ok() || done > 0 {
+        csv.file.finish(&[])?;
+    }
+    ended?;
     let word = if failed { "FAILED" } else { "held" };
     let to = if args.json { &mut streams.talk } else { &mut streams.out };
-    writeln!(to, "verdict: {word}; figures and series in {}", out.display())?;
+    writeln!(to, "verdict: {word}; figures and series in {}", out.path().display())?;
     Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
+}
+
+/// The series of all cases, one head above them.
+struct Csv<'a> {
+    file: OutFile<'a>,
+    begun: bool,
+}
+
+impl Csv<'_> {
+    fn add(&mut self, lines: &str) -> Result<(), CliError> {
+        let head = usize::from(std::mem::replace(&mut self.begun, true));
+        lines.lines().skip(head).try_for_each(|line| self.file.line(line))
+    }
+}
+
+/// Says what a case is.
+fn about(case: &Case, world: &World) -> String {
+    let state = FrameState::at(world, Moment { frame: world.scene.frames / 2, view: 0 });
+    let complexity = depth_complexity(world, &state);
+    format!(
+        "{}: {} objects, {} moving, {} triangles, {} after the cut, {} parts (at most {} triangles each), {} frames; depth complexity {complexity:.1} in the middle frame; {} in {:.1} s{}",
+        case.label,
+        world.partition.object_count(),
+        world.moving_count(),
+        world.scene.triangle_count(),
+        world.partition.fragment_count(),
+        world.partition.part_count(),
+        case.args.leaf_triangles(&world.scene),
+        world.scene.frames,
+        how_made(&world.made),
+        world.build_seconds,
+        peak_memory()
+    )
 }
 
 /// Tables, failures and figures of one case; whether anything failed.
@@ -160,7 +182,7 @@ fn tell_case(
     case: &Case,
     finished: &Finished,
     model: &CostModel,
-    (out, csv, json): (&Path, &mut String, bool),
+    (figures, csv, json): (Figures<'_>, &mut Csv<'_>, bool),
     streams: &mut Streams<'_>,
     bar: &indicatif::ProgressBar,
 ) -> Result<bool, CliError> {
@@ -175,6 +197,7 @@ fn tell_case(
             oracles.push(trace.lane.oracle);
         }
     }
+    let mut figures = Some(figures);
     for oracle in &oracles {
         let of: Vec<Trace> =
             finished.traces.iter().filter(|t| t.lane.oracle == *oracle).cloned().collect();
@@ -188,13 +211,11 @@ fn tell_case(
         bar.suspend(|| writeln!(streams.out, "{said}"))?;
         // Series and figures of the device where there is one: the last oracle.
         if oracles.last() == Some(oracle) {
-            let lines = comparison.csv();
-            let head = lines.find('\n').map_or(0, |end| end + 1);
-            *csv += if csv.is_empty() { &lines } else { &lines[head..] };
-            for (stem, chart) in comparison.charts() {
-                let path = |kind: &str| out.join(format!("{}-{stem}.{kind}", case.label));
-                OutFile::create(&path("svg"))?.finish(chart.svg().as_bytes())?;
-                OutFile::create(&path("png"))?.finish(&picture_png(&chart.png()))?;
+            csv.add(&comparison.csv())?;
+            let figures = figures.take().into_iter().flatten();
+            for ([svg, png], (_, chart)) in figures.zip(comparison.charts()) {
+                svg.finish(chart.svg().as_bytes())?;
+                png.finish(&picture_png(&chart.png()))?;
             }
         }
     }

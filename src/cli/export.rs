@@ -6,9 +6,12 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::args::SceneArgs;
+use super::files::Files;
 use super::progress::progress_bar;
-use super::run::{Named, catch_interrupt, interrupted, pick_cache};
-use super::{CliError, EXIT_HELD, OutFile, Streams};
+use super::run::{Named, pick_cache};
+use super::signals::{catch_interrupt, interrupted};
+use super::target::is_stream;
+use super::{CliError, EXIT_HELD, Outputs, Streams};
 use crate::foreign::{frame_line, gltf_file, header_line};
 use crate::run::{FrameState, Moment, RunError};
 
@@ -25,49 +28,49 @@ pub(super) struct ExportArgs {
     out: PathBuf,
 }
 
-pub(super) fn export(args: &ExportArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+impl ExportArgs {
+    pub(super) fn files(&self) -> Files {
+        let stream = Some(self.out.as_path()).filter(|path| is_stream(path));
+        Files::of_scenes(std::slice::from_ref(&self.scene), &self.scene_args)
+            .writing("--out", stream)
+    }
+}
+
+pub(super) fn export(
+    args: &ExportArgs,
+    outputs: &mut Outputs<'_>,
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
     let named = Named::open(&args.scene, &args.scene_args)?;
     let cache = pick_cache(&args.scene_args)?;
-    let to_stream = args.out.as_os_str() == "-";
-    let write = |path: &std::path::Path| {
-        let path = path.display().to_string();
-        move |source| CliError::Write { path, source }
-    };
-    let files = if to_stream {
-        None
+    let (folder, mut frames, meshes) = if is_stream(&args.out) {
+        (None, outputs.file("--out", &args.out)?, None)
     } else {
-        std::fs::create_dir_all(&args.out).map_err(write(&args.out))?;
-        let file = |name: &str| OutFile::create(&args.out.join(name));
-        Some((file("scene.gltf")?, file("scene.bin")?, file("frames.jsonl")?))
+        let folder = outputs.folder("--out", &args.out)?;
+        let mut file = |name: &str| folder.file(outputs, name);
+        let (frames, meshes) = (file("frames.jsonl")?, (file("scene.gltf")?, file("scene.bin")?));
+        (Some(folder), frames, Some(meshes))
     };
     catch_interrupt();
     let bar = progress_bar();
     let world = named.world(&args.scene_args, cache.as_ref(), &bar, streams);
     bar.finish_and_clear();
     let world = world?;
-    let mut lines = Vec::new();
-    let mut put = |line: String, streams: &mut Streams<'_>| -> std::io::Result<()> {
-        if to_stream {
-            // Whoever reads is waiting for it.
-            writeln!(streams.out, "{line}")?;
-            return streams.out.flush();
-        }
-        lines.extend_from_slice(line.as_bytes());
-        lines.push(b'\n');
-        Ok(())
-    };
-    put(header_line(&world), streams)?;
+    frames.line(&header_line(&world))?;
     for moment in Moment::all(&world, world.scene.frames) {
         if interrupted() {
             return Err(RunError::Interrupted.into());
         }
-        put(frame_line(&world, &FrameState::at(&world, moment)), streams)?;
+        // Whoever reads a stream is waiting for it.
+        frames.line(&frame_line(&world, &FrameState::at(&world, moment)))?;
     }
-    if let Some((text, binary, frames)) = files {
+    if let Some((text, binary)) = meshes {
         let gltf = gltf_file(&world, "scene.bin");
         binary.finish(&gltf.binary)?;
         text.finish(gltf.json.as_bytes())?;
-        frames.finish(&lines)?;
+    }
+    frames.finish(&[])?;
+    if folder.is_some() {
         writeln!(
             streams.out,
             "{}: scene.gltf and scene.bin ({} parts of {} objects), frames.jsonl ({} frames, {} views each)",

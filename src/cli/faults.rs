@@ -6,9 +6,10 @@ use clap::Args;
 use rayon::prelude::*;
 use serde_json::json;
 
+use super::files::Files;
 use super::progress::progress_bar;
-use super::run::{catch_interrupt, interrupted};
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use super::signals::{catch_interrupt, interrupted};
+use super::{CliError, EXIT_FAILED, EXIT_HELD, Outputs, Streams};
 use crate::cull::CULLERS;
 use crate::fault::{self, Evidence, Fault, Harm, OTHERS, SOUND, Trial, faults as all_faults};
 use crate::run::World;
@@ -45,9 +46,15 @@ pub(super) struct FaultsArgs {
     /// One JSON object a fault on standard output in place of the table.
     #[arg(long)]
     json: bool,
-    /// Also write the JSON lines to this file.
-    #[arg(long, value_name = "FILE")]
+    /// Also write the JSON lines to this file; `-` is standard output, and the table goes to standard error.
+    #[arg(long, value_name = "FILE|-")]
     out: Option<PathBuf>,
+}
+
+impl FaultsArgs {
+    pub(super) fn files(&self) -> Files {
+        Files::default().writing("--out", self.out.as_deref()).json(self.json)
+    }
 }
 
 /// One fault over its scenes and seeds.
@@ -266,8 +273,13 @@ impl Hunt {
 }
 
 /// Looks for each fault in at most `most` worlds of the swarm.
-fn hunt(args: &FaultsArgs, most: u64, streams: &mut Streams<'_>) -> Result<u8, CliError> {
-    let mut out = args.out.as_deref().map(OutFile::create).transpose()?;
+fn hunt(
+    args: &FaultsArgs,
+    most: u64,
+    outputs: &mut Outputs<'_>,
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
+    let mut out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
     let chosen = pick(&args.fault)?;
     catch_interrupt();
     let bar = progress_bar();
@@ -277,17 +289,14 @@ fn hunt(args: &FaultsArgs, most: u64, streams: &mut Streams<'_>) -> Result<u8, C
         writeln!(streams.out, "{:<wide$} class  median seeds  caught in", "fault")?;
     }
     let (mut caught, mut alarms, mut medians) = (0, 0, Vec::new());
-    for &fault in &chosen {
+    let mut done = 0;
+    let ended = chosen.iter().try_for_each(|&fault| {
         bar.set_message(fault.name);
-        let hunt = Hunt::new(fault, most);
-        if hunt.is_err() {
-            bar.finish_and_clear();
-        }
-        let hunt = hunt?;
+        let hunt = Hunt::new(fault, most)?;
         bar.inc(1);
         let line = hunt.json();
         if let Some(out) = &mut out {
-            out.line(&line)?;
+            bar.suspend(|| out.line(&line))?;
         }
         let median = hunt.median().map_or("NEVER".to_owned(), |median| median.to_string());
         let (found, run) = (hunt.found.len(), hunt.run);
@@ -304,11 +313,15 @@ fn hunt(args: &FaultsArgs, most: u64, streams: &mut Streams<'_>) -> Result<u8, C
         alarms += hunt.false_alarms.len();
         caught += usize::from(!hunt.found.is_empty());
         medians.extend(hunt.median());
-    }
+        done += 1;
+        Ok::<(), CliError>(())
+    });
     bar.finish_and_clear();
-    if let Some(out) = out {
+    // What was finished is kept; where nothing was, what stood there before stays.
+    if let Some(out) = out.filter(|_| ended.is_ok() || done > 0) {
         out.finish(&[])?;
     }
+    ended?;
     medians.sort_unstable();
     let half = medians.get(medians.len().saturating_sub(1) / 2).copied().unwrap_or(0);
     let to = if args.json { &mut streams.talk } else { &mut streams.out };
@@ -321,34 +334,37 @@ fn hunt(args: &FaultsArgs, most: u64, streams: &mut Streams<'_>) -> Result<u8, C
     Ok(if caught == chosen.len() && alarms == 0 { EXIT_HELD } else { EXIT_FAILED })
 }
 
-pub(super) fn faults(args: &FaultsArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+pub(super) fn faults(
+    args: &FaultsArgs,
+    outputs: &mut Outputs<'_>,
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
     if let Some(most) = args.swarm {
-        return hunt(args, most, streams);
+        return hunt(args, most, outputs, streams);
     }
-    let out = args.out.as_deref().map(OutFile::create).transpose()?;
+    let mut out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
     let chosen = pick(&args.fault)?;
     catch_interrupt();
     let bar = progress_bar();
     let steps = if args.fault.is_empty() { chosen.len() + HARD.len() } else { chosen.len() };
     bar.set_length(steps as u64);
-    let (mut tried, mut lines) = (Vec::new(), String::new());
-    for fault in &chosen {
+    let mut tried = Vec::new();
+    let mut ended = chosen.iter().try_for_each(|fault| {
         bar.set_message(fault.name);
-        let one = try_fault(fault, args, &mut || !interrupted());
-        if one.is_err() {
-            bar.finish_and_clear();
-        }
-        let one = one?;
+        let one = try_fault(fault, args, &mut || !interrupted())?;
         bar.inc(1);
         let line = one.json(args);
         if args.json {
             bar.suspend(|| writeln!(streams.out, "{line}"))?;
         }
-        lines += &format!("{line}\n");
+        if let Some(out) = &mut out {
+            bar.suspend(|| out.line(&line))?;
+        }
         tried.push(one);
-    }
+        Ok(())
+    });
     let mut sound = SoundRuns::default();
-    if args.fault.is_empty() {
+    if args.fault.is_empty() && ended.is_ok() {
         let mut last = String::new();
         let ran = sound_runs(args, &mut |scene| {
             if scene != last {
@@ -358,16 +374,15 @@ pub(super) fn faults(args: &FaultsArgs, streams: &mut Streams<'_>) -> Result<u8,
             }
             !interrupted()
         });
-        if ran.is_err() {
-            bar.finish_and_clear();
-        }
-        sound = ran?;
+        ended = ran.map(|runs| sound = runs);
     }
     bar.finish_and_clear();
-    let held = conclude(args, &tried, &sound, streams)?;
-    if let Some(out) = out {
-        out.finish(lines.as_bytes())?;
+    // What was finished is kept; where nothing was, what stood there before stays.
+    if let Some(out) = out.filter(|_| ended.is_ok() || !tried.is_empty()) {
+        out.finish(&[])?;
     }
+    ended?;
+    let held = conclude(args, &tried, &sound, streams)?;
     Ok(if held { EXIT_HELD } else { EXIT_FAILED })
 }
 

@@ -3,16 +3,19 @@
 //! of `crate::foreign`.
 
 use std::io::{BufReader, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use clap::Args;
 use plainsight_reference::Tolerance;
 
 use super::args::{SceneArgs, quoted};
+use super::files::Files;
+use super::out_file::OutFolder;
 use super::progress::progress_bar;
 use super::run::{Named, catch_interrupt, interrupted, pick_cache};
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use super::waiting::Waiting;
+use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Outputs, Streams};
 use crate::check::Gate;
 use crate::foreign::{Drawn, ForeignError, frame_line, header_line};
 use crate::part::PartId;
@@ -44,9 +47,19 @@ pub(super) struct JudgeArgs {
     /// One JSON object on standard output in place of the table.
     #[arg(long)]
     json: bool,
-    /// Also write the result as JUnit XML to this file.
-    #[arg(long, value_name = "FILE.xml")]
+    /// Also write the result as JUnit XML to this file, or to standard output for `-`.
+    #[arg(long, value_name = "FILE.xml|-")]
     junit: Option<PathBuf>,
+}
+
+impl JudgeArgs {
+    pub(super) fn files(&self) -> Files {
+        let drawn = self.drawn.as_deref().filter(|path| path.as_os_str() != "-");
+        Files::of_scenes(std::slice::from_ref(&self.scene), &self.scene_args)
+            .reading("--drawn", drawn)
+            .writing("--junit", self.junit.as_deref())
+            .json(self.json)
+    }
 }
 
 impl From<ForeignError> for CliError {
@@ -122,10 +135,33 @@ impl Observer for Watch {
     }
 }
 
-pub(super) fn judge(args: &JudgeArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+pub(super) fn judge(
+    args: &JudgeArgs,
+    outputs: &mut Outputs<'_>,
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
+    let junit_file = args.junit.as_deref().map(|path| outputs.file("--junit", path)).transpose()?;
+    let mut cases = Vec::new();
+    let code = judge_lane(args, &mut cases, outputs, streams);
+    let Some(file) = junit_file else { return code };
+    if let Err(error) = &code {
+        cases.push(error_case(&args.scene, "judge", error, outputs.again()));
+    }
+    let written = file.finish(junit(&cases).as_bytes());
+    code.and_then(|code| written.map(|()| code))
+}
+
+fn judge_lane(
+    args: &JudgeArgs,
+    cases: &mut Vec<JunitCase>,
+    outputs: &mut Outputs<'_>,
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
+    let folder = args.pictures.as_deref().map(|path| outputs.folder("--pictures", path));
+    let folder = folder.transpose()?;
+    let files = folder.as_ref().map(|folder| PictureFiles::new(folder, outputs)).transpose()?;
     let named = Named::open(&args.scene, &args.scene_args)?;
     let cache = pick_cache(&args.scene_args)?;
-    let junit_file = args.junit.as_deref().map(OutFile::create).transpose()?;
     let (name, file) = match (&args.drawn, &args.pipe) {
         (Some(path), _) if path.as_os_str() != "-" => {
             let read = |source| crate::scene::SceneError::Read { path: path.clone(), source };
@@ -140,15 +176,17 @@ pub(super) fn judge(args: &JudgeArgs, streams: &mut Streams<'_>) -> Result<u8, C
     bar.finish_and_clear();
     let world = world?;
     let mut process = None;
-    let mut drawn = match (file, &args.pipe) {
-        (Some(file), _) => Drawn::new(BufReader::new(file), name),
+    // What a culler says may come late or never: a signal is not kept waiting.
+    let answers = match (file, &args.pipe) {
+        (Some(file), _) => Waiting::new(file),
         (None, Some(command)) => {
             let (started, answers) = Process::start(command)?;
             process = Some(started);
-            Drawn::new(BufReader::new(answers), name)
+            Waiting::new(answers)
         }
-        (None, None) => Drawn::new(BufReader::new(std::io::stdin()), name),
+        (None, None) => Waiting::new(std::io::stdin()),
     };
+    let mut drawn = Drawn::new(BufReader::new(answers), name);
     let bar = progress_bar();
     bar.set_message(args.scene.clone());
     bar.inc_length(u64::from(world.scene.frames) * u64::from(world.views()));
@@ -157,9 +195,9 @@ pub(super) fn judge(args: &JudgeArgs, streams: &mut Streams<'_>) -> Result<u8, C
     // Ctrl-C reaches the process as well: what it did not say then is no fault of its own.
     let stopped = |error| if interrupted() { RunError::Interrupted.into() } else { error };
     let (trace, gate, worst) = judged.map_err(stopped)?;
-    tell(args, &world, (&trace, &gate), junit_file, streams)?;
-    if let (Some(folder), Some((moment, drawn))) = (&args.pictures, worst) {
-        pictures(&world, moment, &drawn, folder, streams)?;
+    cases.push(tell(args, &world, (&trace, &gate), streams)?);
+    if let (Some(files), Some((moment, drawn))) = (files, worst) {
+        pictures(&world, moment, &drawn, files, streams)?;
     }
     Ok(if gate.held() { EXIT_HELD } else { EXIT_FAILED })
 }
@@ -223,9 +261,8 @@ fn tell(
     args: &JudgeArgs,
     world: &World,
     (trace, gate): (&Trace, &Gate),
-    junit_file: Option<OutFile>,
     streams: &mut Streams<'_>,
-) -> Result<(), CliError> {
+) -> Result<JunitCase, CliError> {
     let row = Row::new(world, trace, gate, partition_difference(world));
     if args.json {
         let line = serde_json::to_string(&row).expect("a row is plain data");
@@ -238,10 +275,7 @@ fn tell(
         writeln!(streams.talk, "FAILED: {}", trace.lane.culler)?;
         failures.iter().try_for_each(|line| writeln!(streams.talk, "  {line}"))?;
     }
-    if let Some(file) = junit_file {
-        file.finish(junit(&[junit_case(&row, failures)]).as_bytes())?;
-    }
-    Ok(())
+    Ok(junit_case(&row, failures))
 }
 
 /// What the gate says of a lane, the line that replays it last; nothing where it held.
@@ -260,6 +294,33 @@ pub(super) fn junit_case(row: &Row, failures: Vec<String>) -> JunitCase {
         name: format!("{}@{}", row.culler, row.oracle),
         seconds: row.wall_ms / 1000.0,
         failures,
+        errors: Vec::new(),
+    }
+}
+
+/// A case that came to no verdict: why, and the line that runs it again.
+pub(super) fn error_case(scene: &str, name: &str, error: &CliError, again: &str) -> JunitCase {
+    JunitCase {
+        scene: scene.to_owned(),
+        name: name.to_owned(),
+        seconds: 0.0,
+        failures: Vec::new(),
+        errors: vec![error.to_string(), format!("replay: {again}")],
+    }
+}
+
+/// The pictures of a bad frame.
+struct PictureFiles<'a> {
+    folder: String,
+    /// The truth, what was drawn, the view from above.
+    files: [OutFile<'a>; 3],
+}
+
+impl<'a> PictureFiles<'a> {
+    fn new(folder: &OutFolder, outputs: &mut Outputs<'a>) -> Result<Self, CliError> {
+        let mut file = |name: &str| folder.file(outputs, name);
+        let files = [file("truth.png")?, file("drawn.png")?, file("top.png")?];
+        Ok(Self { folder: folder.path().display().to_string(), files })
     }
 }
 
@@ -267,24 +328,18 @@ fn pictures(
     world: &World,
     moment: Moment,
     drawn: &[PartId],
-    folder: &Path,
+    PictureFiles { folder, files }: PictureFiles<'_>,
     streams: &mut Streams<'_>,
 ) -> Result<(), CliError> {
-    std::fs::create_dir_all(folder)
-        .map_err(|source| CliError::Write { path: folder.display().to_string(), source })?;
     let state = FrameState::at(world, moment);
     let truth = Truth::of(world, &state);
     let mut image = world.image();
     render(world, &state, drawn, &mut image);
     let top = top_view(world, &state, &Shown { drawn, truth: &truth }, TOP_VIEW_SIDE);
-    for (name, picture) in [
-        ("truth.png", part_picture(world, &truth.image)),
-        ("drawn.png", part_picture(world, &image)),
-        ("top.png", top),
-    ] {
-        OutFile::create(&folder.join(name))?.finish(&picture_png(&picture))?;
+    let pictures = [part_picture(world, &truth.image), part_picture(world, &image), top];
+    for (file, picture) in files.into_iter().zip(pictures) {
+        file.finish(&picture_png(&picture))?;
     }
-    let folder = folder.display();
     writeln!(streams.talk, "pictures of {moment}: {folder}/truth.png, drawn.png, top.png")?;
     Ok(())
 }

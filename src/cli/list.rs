@@ -1,5 +1,6 @@
 //! `list`: what there is to name.
 
+use super::quiet::quietly;
 use super::{CliError, EXIT_HELD, Streams};
 use crate::cull::CullerKind;
 use crate::index::INDEXES;
@@ -52,6 +53,6 @@ pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<
 }
 
 fn devices() -> Vec<String> {
-    let adapters = Gpu::adapters();
+    let adapters = quietly(Gpu::adapters);
     if adapters.is_empty() { vec![NO_DEVICE.to_owned()] } else { adapters }
 }

@@ -8,22 +8,33 @@ mod calibrate;
 mod compare;
 mod export;
 mod faults;
+mod files;
 mod judge;
 mod list;
+mod merge;
+mod out_file;
 mod picture;
 mod progress;
+mod quiet;
 mod replay;
 mod report;
 mod run;
+mod signals;
 mod stress;
+mod target;
 mod thesis;
+mod waiting;
 mod why;
 
+use std::cell::RefCell;
 use std::ffi::OsString;
 use std::io::Write;
-use std::path::Path;
 
 use clap::Parser;
+
+use args::{Cli, Verb, quoted};
+use files::Files;
+use out_file::{OutFile, Outputs};
 
 use crate::cull::CullerKind;
 use crate::oracle::OracleError;
@@ -39,8 +50,10 @@ pub const EXIT_FAILED: u8 = 1;
 pub const EXIT_USAGE: u8 = 2;
 /// A device was lost, or missing where one was required.
 pub const EXIT_DEVICE: u8 = 3;
-/// Stopped by the user, as shells count it: 128 + SIGINT.
+/// Stopped by the user, as shells count it: 128 + SIGINT. By SIGTERM it is 143, by SIGHUP 129.
 pub const EXIT_INTERRUPTED: u8 = 130;
+/// Whoever read the results went away, as shells count it: 128 + SIGPIPE. Nobody was told how it ended.
+pub const EXIT_READER_GONE: u8 = 141;
 
 /// Where results and talk go.
 pub struct Streams<'a> {
@@ -63,8 +76,6 @@ enum CliError {
     Usage(String),
     #[error("{0}; choose another --cache")]
     Cache(#[from] CacheError),
-    #[error("{path}: cannot write: {source}; choose another --out")]
-    Write { path: String, source: std::io::Error },
     #[error("writing the results: {0}")]
     Stream(#[from] std::io::Error),
 }
@@ -78,12 +89,27 @@ impl From<OracleError> for CliError {
 impl CliError {
     fn exit(&self) -> u8 {
         match self {
-            Self::Run(RunError::Interrupted) => EXIT_INTERRUPTED,
+            Self::Run(RunError::Interrupted) => signals::exit_interrupted(),
             Self::Run(RunError::Oracle(_)) => EXIT_DEVICE,
-            // A reader that has had enough (`| head`) is no error of ours.
-            Self::Stream(error) if error.kind() == std::io::ErrorKind::BrokenPipe => EXIT_HELD,
+            // A reader that has had enough (`| head`) is no error of ours, and no pass either.
+            Self::Stream(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {
+                EXIT_READER_GONE
+            }
             _ => EXIT_USAGE,
         }
+    }
+}
+
+/// Standard error for two: what would go to standard output, were that not taken, and talk.
+struct Shared<'a, 'b>(&'a RefCell<&'b mut dyn Write>);
+
+impl Write for Shared<'_, '_> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.borrow_mut().write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.borrow_mut().flush()
     }
 }
 
@@ -94,7 +120,8 @@ pub fn main(
     cullers: &[CullerKind],
     mut streams: Streams<'_>,
 ) -> u8 {
-    let cli = match args::Cli::try_parse_from(args) {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let cli = match Cli::try_parse_from(&args) {
         Ok(cli) => cli,
         Err(error) => {
             let wanted = !error.use_stderr();
@@ -104,71 +131,72 @@ pub fn main(
             return if wanted { EXIT_HELD } else { EXIT_USAGE };
         }
     };
-    let done = match cli.verb.unwrap_or_default() {
-        args::Verb::Run(args) => run::run(&args, cullers, &mut streams),
-        args::Verb::Replay(args) => replay::replay(&args, cullers, &mut streams),
-        args::Verb::Picture(args) => picture::picture(&args, cullers, &mut streams),
-        args::Verb::Compare(args) if args.thesis => thesis::compare(&args, &mut streams),
-        args::Verb::Compare(args) => compare::compare(&args, cullers, &mut streams),
-        args::Verb::Calibrate(args) => calibrate::calibrate(&args, &mut streams),
-        args::Verb::Export(args) => export::export(&args, &mut streams),
-        args::Verb::Judge(args) => judge::judge(&args, &mut streams),
-        args::Verb::Why(args) => why::why(&args, cullers, &mut streams),
-        args::Verb::Faults(args) => faults::faults(&args, &mut streams),
-        args::Verb::Stress(args) => stress::stress(&args, cullers, &mut streams),
-        args::Verb::Accuracy(args) => accuracy::accuracy(&args, &mut streams),
-        args::Verb::Report(args) => report::report(&args, cullers, &mut streams),
-        args::Verb::Tune(args) => thesis::tune_verb(&args, &mut streams),
-        args::Verb::List => list::list(cullers, &mut streams),
+    let verb = cli.verb.unwrap_or_default();
+    let files = files(&verb);
+    let words = args.iter().skip(1).map(|word| quoted(&word.to_string_lossy()));
+    let again = std::iter::once("plainsight".to_owned()).chain(words).collect::<Vec<_>>().join(" ");
+    let Streams { out, talk, width } = streams;
+    let done = if files.streams().next().is_some() {
+        let talk: RefCell<&mut dyn Write> = RefCell::new(&mut *talk);
+        let (mut tables, mut words) = (Shared(&talk), Shared(&talk));
+        let mut streams = Streams { out: &mut tables, talk: &mut words, width: None };
+        Outputs::new(&files, Some(out), again)
+            .and_then(|mut outputs| run_verb(verb, cullers, &mut outputs, &mut streams))
+    } else {
+        let mut streams = Streams { out: &mut *out, talk: &mut *talk, width };
+        Outputs::new(&files, None, again).and_then(|mut outputs| {
+            let code = run_verb(verb, cullers, &mut outputs, &mut streams)?;
+            streams.out.flush()?;
+            Ok(code)
+        })
     };
     done.unwrap_or_else(|error| {
-        if !matches!(&error, CliError::Stream(e) if e.kind() == std::io::ErrorKind::BrokenPipe) {
-            let _ = writeln!(streams.talk, "plainsight: {error}");
+        if error.exit() != EXIT_READER_GONE {
+            let _ = writeln!(talk, "plainsight: {error}");
         }
         error.exit()
     })
 }
 
-/// A file that appears whole or not at all: written beside its place under another name, renamed when
-/// done. Made before the work begins, so that an unwritable place is known at once.
-struct OutFile {
-    path: std::path::PathBuf,
-    partial: std::path::PathBuf,
-    file: Option<std::fs::File>,
-}
-
-impl OutFile {
-    fn create(path: &Path) -> Result<Self, CliError> {
-        let write = |source| CliError::Write { path: path.display().to_string(), source };
-        if path.is_dir() {
-            return Err(write(std::io::Error::other("it is a folder")));
-        }
-        let mut name = path.file_name().unwrap_or_default().to_owned();
-        name.push(format!(".{}.part", std::process::id()));
-        let partial = path.with_file_name(name);
-        let file = std::fs::File::create(&partial).map_err(write)?;
-        Ok(Self { path: path.to_owned(), partial, file: Some(file) })
-    }
-
-    /// Adds a line to what [`OutFile::finish`] will leave.
-    fn line(&mut self, line: &str) -> Result<(), CliError> {
-        let file = self.file.as_mut().expect("a file is finished once");
-        writeln!(file, "{line}")
-            .map_err(|source| CliError::Write { path: self.path.display().to_string(), source })
-    }
-
-    fn finish(mut self, bytes: &[u8]) -> Result<(), CliError> {
-        let mut file = self.file.take().expect("a file is finished once");
-        let done = file.write_all(bytes).and_then(|()| file.sync_all());
-        drop(file);
-        done.and_then(|()| std::fs::rename(&self.partial, &self.path))
-            .map_err(|source| CliError::Write { path: self.path.display().to_string(), source })
+/// The files that a verb's arguments name.
+fn files(verb: &Verb) -> Files {
+    match verb {
+        Verb::Run(args) => args.files(),
+        Verb::Picture(args) => args.files(),
+        Verb::Compare(args) => args.files(),
+        Verb::Calibrate(args) => args.files(),
+        Verb::Export(args) => args.files(),
+        Verb::Judge(args) => args.files(),
+        Verb::Why(args) => args.files(),
+        Verb::Faults(args) => args.files(),
+        Verb::Stress(args) => args.files(),
+        Verb::Accuracy(args) => args.files(),
+        Verb::Report(args) => args.files(),
+        Verb::Replay(_) | Verb::Tune(_) | Verb::List => Files::default(),
     }
 }
 
-impl Drop for OutFile {
-    fn drop(&mut self) {
-        // After a finished rename there is nothing left to remove.
-        let _ = std::fs::remove_file(&self.partial);
+fn run_verb(
+    verb: Verb,
+    cullers: &[CullerKind],
+    outputs: &mut Outputs<'_>,
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
+    match verb {
+        Verb::Run(args) => run::run(&args, cullers, outputs, streams),
+        Verb::Replay(args) => replay::replay(&args, cullers, streams),
+        Verb::Picture(args) => picture::picture(&args, cullers, outputs, streams),
+        Verb::Compare(args) if args.thesis => thesis::compare(&args, outputs, streams),
+        Verb::Compare(args) => compare::compare(&args, cullers, outputs, streams),
+        Verb::Calibrate(args) => calibrate::calibrate(&args, outputs, streams),
+        Verb::Export(args) => export::export(&args, outputs, streams),
+        Verb::Judge(args) => judge::judge(&args, outputs, streams),
+        Verb::Why(args) => why::why(&args, cullers, outputs, streams),
+        Verb::Faults(args) => faults::faults(&args, outputs, streams),
+        Verb::Stress(args) => stress::stress(&args, cullers, outputs, streams),
+        Verb::Accuracy(args) => accuracy::accuracy(&args, outputs, streams),
+        Verb::Report(args) => report::report(&args, cullers, outputs, streams),
+        Verb::Tune(args) => thesis::tune_verb(&args, streams),
+        Verb::List => list::list(cullers, streams),
     }
 }

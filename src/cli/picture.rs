@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::args::{Layer, PictureArgs};
 use super::progress::progress_bar;
-use super::run::{catch_interrupt, one_lane};
-use super::{CliError, EXIT_HELD, OutFile, Streams};
+use super::run::one_lane;
+use super::signals::catch_interrupt;
+use super::{CliError, EXIT_HELD, Outputs, Streams};
 use crate::cull::CullerKind;
 use crate::part::PartId;
 use crate::report::{Shown, depth_picture, part_picture, picture_png, top_view};
@@ -37,6 +38,7 @@ pub(super) fn moment_of(
 pub(super) fn picture(
     args: &PictureArgs,
     cullers: &[CullerKind],
+    outputs: &mut Outputs<'_>,
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
     let layer = match args.layer {
@@ -47,7 +49,7 @@ pub(super) fn picture(
     };
     let own_name = || named_after(&args.scene, &format!("{}-{layer}.png", args.frame));
     let path = args.out.clone().unwrap_or_else(own_name);
-    let out = OutFile::create(&path)?;
+    let out = outputs.file("--out", &path)?;
     let mut scene_args = args.scene_args.clone();
     // A culler's history reaches back, so the frames before are run as well; the truth needs none.
     let needs_culler = matches!(args.layer, Layer::Culled | Layer::Top);

@@ -2,6 +2,8 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::signals::stop_where_interrupted;
+
 /// Frames of all lanes, as far as they are known.
 const FRAMES: &str = "{msg:<20} {bar:30} {pos}/{len} frames, {eta} left";
 /// Triangles of the scene's meshes, cut or read.
@@ -18,7 +20,8 @@ pub(super) fn progress_bar() -> ProgressBar {
     bar
 }
 
-/// Lends `bar` to `work` as one of triangles, done of all; then it counts frames where it stopped.
+/// Lends `bar` to `work` as one of triangles, done of all; then it counts frames where it stopped. A signal
+/// ends it after the meshes at hand, by way of [`stop_where_interrupted`].
 pub(super) fn counting_triangles<T>(
     bar: &ProgressBar,
     message: String,
@@ -29,6 +32,7 @@ pub(super) fn counting_triangles<T>(
     bar.set_style(style(TRIANGLES));
     bar.reset_eta();
     let made = work(&|done, all| {
+        stop_where_interrupted();
         bar.set_length(all);
         bar.set_position(done);
     });

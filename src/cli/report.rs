@@ -6,13 +6,15 @@ use clap::Args;
 
 use super::accuracy::FULL_SIZE_SCENES;
 use super::args::SceneArgs;
+use super::files::Files;
+use super::merge::{Merged, merged};
 use super::progress::progress_bar;
 use super::run::{
-    Finished, Named, Oracles, Plan, REPEAT, catch_interrupt, matching, pick_cache, pick_cost,
-    pick_cullers, pick_index,
+    Finished, Named, Oracles, Plan, REPEAT, matching, pick_cache, pick_cost, pick_cullers,
+    pick_index,
 };
-use super::stress::merged;
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use super::signals::catch_interrupt;
+use super::{CliError, EXIT_FAILED, EXIT_HELD, Outputs, Streams};
 use crate::cull::CullerKind;
 use crate::report::{
     Chart, Page, PageAccuracy, PageLane, PagePictures, PageScene, PageSweep, Series, Shown,
@@ -20,7 +22,7 @@ use crate::report::{
 };
 use crate::run::{FrameRecord, FrameTrace, Trace, render};
 use crate::scene::Viewport;
-use crate::stress::{Outcome, Tally};
+use crate::stress::Outcome;
 
 /// What is run where nothing is said, small enough for a page.
 const SCENES: [&str; 4] = ["bunnies", "city", "rooms", "soup"];
@@ -58,16 +60,30 @@ pub(super) struct ReportArgs {
     /// Leave out pictures: a page of some kilobytes.
     #[arg(long)]
     no_pictures: bool,
-    /// The page.
-    #[arg(long, value_name = "FILE.html", default_value = "report.html")]
+    /// The page; `-` is standard output.
+    #[arg(long, value_name = "FILE.html|-", default_value = "report.html")]
     out: PathBuf,
+}
+
+impl ReportArgs {
+    pub(super) fn files(&self) -> Files {
+        let charts = self.accuracy.as_deref().and_then(|folder| charts(folder).ok());
+        let findings = self.accuracy.iter().map(|folder| folder.join(FINDINGS));
+        let accuracy: Vec<PathBuf> = charts.into_iter().flatten().chain(findings).collect();
+        Files::of_scenes(&self.scene, &self.scene_args)
+            .reading("--stress", self.stress.iter().map(PathBuf::as_path))
+            .reading("--accuracy", accuracy.iter().map(PathBuf::as_path))
+            .writing("--out", Some(&self.out))
+    }
 }
 
 pub(super) fn report(
     args: &ReportArgs,
     cullers: &[CullerKind],
+    outputs: &mut Outputs<'_>,
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
+    let out = outputs.file("--out", &args.out)?;
     let names: Vec<&str> = match args.scene.is_empty() {
         true if args.scene_args.full_size => FULL_SIZE_SCENES.to_vec(),
         true => SCENES.to_vec(),
@@ -87,11 +103,16 @@ pub(super) fn report(
     let scenes: Vec<Named> = matching(&names)?.iter().map(open).collect::<Result<_, CliError>>()?;
     let sweep = match args.stress.as_slice() {
         [] => None,
-        files => Some(sweep(&merged(files)?)),
+        files => {
+            let merged = merged(files)?;
+            for what in &merged.missing {
+                writeln!(streams.talk, "WARNING: --stress: missing: {what}")?;
+            }
+            Some(sweep(&merged))
+        }
     };
     let accuracy = args.accuracy.as_deref().map(accuracy).transpose()?;
     let cache = pick_cache(&scene_args)?;
-    let out = OutFile::create(&args.out)?;
     let adapter = scene_args.adapter.as_deref();
     let oracles = Oracles::open(&args.oracle, adapter, streams)?.simulating(&cost, &scene_args);
     let (cullers, repeat, with_bound) = (chosen, REPEAT, false);
@@ -208,7 +229,7 @@ fn scene(finished: Finished, pictures: Vec<(usize, PagePictures)>) -> PageScene 
             world.scene.frames
         ),
         views: world.views(),
-        charts: charts(&world.scene.name, &traces),
+        charts: lane_charts(&world.scene.name, &traces),
         lanes: lanes.collect(),
         shots,
         pictures,
@@ -216,7 +237,7 @@ fn scene(finished: Finished, pictures: Vec<(usize, PagePictures)>) -> PageScene 
 }
 
 /// Parts and questions by frame, of the lanes of the first oracle.
-fn charts(scene: &str, traces: &[Trace]) -> Vec<(String, String)> {
+fn lane_charts(scene: &str, traces: &[Trace]) -> Vec<(String, String)> {
     let oracle = traces[0].lane.oracle;
     let of = || traces.iter().filter(|trace| trace.lane.oracle == oracle);
     let series = |figure: usize| -> Vec<Series> {
@@ -240,7 +261,7 @@ fn charts(scene: &str, traces: &[Trace]) -> Vec<(String, String)> {
     ]
 }
 
-fn sweep(tally: &Tally) -> PageSweep {
+fn sweep(Merged { tally, missing }: &Merged) -> PageSweep {
     let named = |why: String, o: &Outcome| {
         [why, o.seed.to_string(), format!("{}; {}", o.scene, o.options), o.replay.clone()]
     };
@@ -263,8 +284,12 @@ fn sweep(tally: &Tally) -> PageSweep {
     );
     PageSweep {
         line: format!(
-            "{} worlds, {} frames, {} worlds run twice, {} failed",
-            tally.worlds, tally.shots, tally.repeated, tally.failed
+            "{} worlds, {} frames, {} worlds run twice, {} failed{}",
+            tally.worlds,
+            tally.shots,
+            tally.repeated,
+            tally.failed,
+            missing.iter().map(|what| format!("; missing: {what}")).collect::<String>()
         ),
         failed: tally.failed > 0,
         situations: tally
@@ -276,6 +301,18 @@ fn sweep(tally: &Tally) -> PageSweep {
     }
 }
 
+/// The words that `accuracy` leaves.
+const FINDINGS: &str = "findings.md";
+
+/// The charts in a folder, by name.
+fn charts(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path()));
+    let mut files = entries.collect::<std::io::Result<Vec<PathBuf>>>()?;
+    files.retain(|path| path.extension().is_some_and(|extension| extension == "svg"));
+    files.sort();
+    Ok(files)
+}
+
 /// The charts and findings of a folder.
 fn accuracy(folder: &Path) -> Result<PageAccuracy, CliError> {
     let refuse = |path: &Path, error: std::io::Error| {
@@ -284,15 +321,12 @@ fn accuracy(folder: &Path) -> Result<PageAccuracy, CliError> {
             path.display()
         ))
     };
-    let words = folder.join("findings.md");
+    let words = folder.join(FINDINGS);
     let findings = std::fs::read_to_string(&words).map_err(|error| refuse(&words, error))?;
-    let entries = std::fs::read_dir(folder).map_err(|error| refuse(folder, error))?;
-    let mut files: Vec<PathBuf> = entries
-        .map(|entry| Ok(entry?.path()))
-        .collect::<std::io::Result<_>>()
-        .map_err(|error| refuse(folder, error))?;
-    files.retain(|path| path.extension().is_some_and(|extension| extension == "svg"));
-    files.sort();
+    let files = charts(folder).map_err(|error| refuse(folder, error))?;
+    if files.is_empty() {
+        return Err(refuse(folder, std::io::Error::other("there is no chart in it")));
+    }
     let chart = |path: &PathBuf| {
         let svg = std::fs::read_to_string(path).map_err(|error| refuse(path, error))?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -2,14 +2,16 @@
 
 use std::cell::RefCell;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::ProgressBar;
 
 use super::args::{RunArgs, SceneArgs, quoted};
-use super::judge::{failure_lines, junit_case};
+use super::judge::{error_case, failure_lines, junit_case};
 use super::progress::{counting_triangles, progress_bar};
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use super::quiet::quietly;
+use super::signals::stoppable;
+pub(super) use super::signals::{catch_interrupt, interrupted};
+use super::{CliError, EXIT_FAILED, EXIT_HELD, Outputs, Streams};
 use crate::check::Gate;
 use crate::cull::{Culler, CullerKind, CullerSetup, PerView};
 use crate::index::{Entry, INDEXES, IndexKind};
@@ -19,7 +21,7 @@ use crate::oracle::{
     Simulated, Stage,
 };
 use crate::part::{Cache, PartId};
-use crate::report::{Row, junit, table};
+use crate::report::{JunitCase, Row, junit, table};
 use crate::run::{
     FrameRecord, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World,
     partition_difference, run as run_lanes,
@@ -35,14 +37,6 @@ const DEFAULT_SCENES: [&str; 4] = ["bunnies", "city", "rooms", "soup"];
 const DEFAULT_RUN_FRAMES: u32 = 6;
 /// How many of the cullers the default run takes.
 const DEFAULT_CULLERS: usize = 3;
-
-/// Set by Ctrl-C; a run looks at it after every frame of every lane.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
-/// Whether the user asked to stop.
-pub(super) fn interrupted() -> bool {
-    INTERRUPTED.load(Ordering::Relaxed)
-}
 
 /// The oracles of one invocation; the device is opened once.
 pub(super) struct Oracles {
@@ -72,8 +66,11 @@ impl Oracles {
         streams: &mut Streams<'_>,
     ) -> Result<Self, CliError> {
         let wanted = names.is_empty() || names.iter().any(|name| on_device(name));
-        let found =
-            if wanted { Gpu::open(adapter) } else { Err(OracleError::NoDevice(String::new())) };
+        let found = if wanted {
+            quietly(|| Gpu::open(adapter))
+        } else {
+            Err(OracleError::NoDevice(String::new()))
+        };
         let asked_for = !names.is_empty() || adapter.is_some();
         let mut names = if names.is_empty() {
             vec!["sim".to_owned(), "hardware".to_owned()]
@@ -216,9 +213,10 @@ impl Named {
         streams: &mut Streams<'_>,
     ) -> Result<World, CliError> {
         let message = format!("{}: object trees", self.name);
-        let world = counting_triangles(bar, message, |progress| {
+        let make = |progress: &(dyn Fn(u64, u64) + Sync)| {
             World::make(self.scene.clone(), args.partition(&self.scene), cache, progress)
-        });
+        };
+        let world = stoppable(|| counting_triangles(bar, message, make))?;
         let world = world.rendered(args.render());
         bar.suspend(|| {
             let warnings = &world.made.warnings;
@@ -358,7 +356,7 @@ impl Plan<'_> {
         bar.set_message(name.clone());
         let mut tick = || {
             bar.inc(1);
-            !INTERRUPTED.load(Ordering::Relaxed)
+            !interrupted()
         };
         let traces = run_lanes(&world, frames, self.repeat, &mut running, &mut tick)?;
         drop(running);
@@ -385,7 +383,7 @@ impl Plan<'_> {
         bar.inc_length(u64::from(frames) * u64::from(world.views()));
         let mut tick = || {
             bar.inc(1);
-            !INTERRUPTED.load(Ordering::Relaxed)
+            !interrupted()
         };
         run_lanes(world, frames, Repeat::NONE, &mut [lane], &mut tick)?;
         Ok(seen.1)
@@ -434,23 +432,43 @@ impl Plan<'_> {
     }
 }
 
-/// Lets Ctrl-C end the run at the next frame. A second handler in one process changes nothing.
-pub(super) fn catch_interrupt() {
-    let _ = ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::Relaxed) {
-            // Asked twice: at once.
-            std::process::exit(i32::from(super::EXIT_INTERRUPTED));
-        }
-    });
+/// What a run came to so far.
+#[derive(Default)]
+struct Told {
+    rows: Vec<Row>,
+    cases: Vec<JunitCase>,
+    failed: bool,
+    /// The scene at hand.
+    scene: Option<String>,
 }
 
 pub(super) fn run(
     args: &RunArgs,
     cullers: &[CullerKind],
+    outputs: &mut Outputs<'_>,
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
-    let out = args.out.as_deref().map(OutFile::create).transpose()?;
-    let junit_file = args.junit.as_deref().map(OutFile::create).transpose()?;
+    let junit_file = args.junit.as_deref().map(|path| outputs.file("--junit", path)).transpose()?;
+    let mut told = Told::default();
+    let code = run_scenes(args, cullers, &mut told, outputs, streams);
+    let Some(file) = junit_file else { return code };
+    if let Err(error) = &code {
+        let scene = told.scene.as_deref().unwrap_or("plainsight");
+        told.cases.push(error_case(scene, "run", error, outputs.again()));
+    }
+    let written = file.finish(junit(&told.cases).as_bytes());
+    code.and_then(|code| written.map(|()| code))
+}
+
+/// Runs scene after scene; what was finished is in `told`, and written, also where one ends in an error.
+fn run_scenes(
+    args: &RunArgs,
+    cullers: &[CullerKind],
+    told: &mut Told,
+    outputs: &mut Outputs<'_>,
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
+    let mut out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
     let names: Vec<&str> = if args.scene.is_empty() {
         DEFAULT_SCENES.to_vec()
     } else {
@@ -480,14 +498,9 @@ pub(super) fn run(
     };
     catch_interrupt();
     let bar = progress_bar();
-    let (mut rows, mut lines, mut failed) = (Vec::new(), String::new(), false);
-    let mut cases = Vec::new();
-    for named in &scenes {
-        let finished = plan.run(named, &bar, streams);
-        if finished.is_err() {
-            bar.finish_and_clear();
-        }
-        let finished = finished?;
+    let ended = scenes.iter().try_for_each(|named| {
+        told.scene = Some(named.name.clone());
+        let finished = plan.run(named, &bar, streams)?;
         let difference = partition_difference(&finished.world);
         for (trace, gate) in finished.traces.iter().zip(&finished.gates) {
             let row = Row::new(&finished.world, trace, gate, difference);
@@ -495,25 +508,29 @@ pub(super) fn run(
             if args.json {
                 bar.suspend(|| writeln!(streams.out, "{line}"))?;
             }
-            lines += &format!("{line}\n");
-            cases.push(junit_case(&row, failure_lines(gate, trace)));
-            rows.push(row);
-            failed |= !gate.held();
+            out.as_mut().map_or(Ok(()), |out| bar.suspend(|| out.line(&line)))?;
+            told.cases.push(junit_case(&row, failure_lines(gate, trace)));
+            told.rows.push(row);
+            told.failed |= !gate.held();
             bar.suspend(|| tell_failures(gate, trace, streams))?;
         }
-    }
+        Ok::<(), CliError>(())
+    });
     bar.finish_and_clear();
     if !args.json {
         let cut = args.scene.is_empty() && args.scene_args.frames.is_none();
-        tell_table(&rows, cut, streams)?;
+        match &ended {
+            Ok(()) => tell_table(&told.rows, cut, streams)?,
+            // No verdict over a part of what was asked for.
+            Err(_) if told.rows.is_empty() => {}
+            Err(_) => write!(streams.out, "{}", table(&told.rows))?,
+        }
     }
-    if let Some(out) = out {
-        out.finish(lines.as_bytes())?;
+    // What stood there before stays where nothing was finished.
+    if let Some(out) = out.filter(|_| ended.is_ok() || !told.rows.is_empty()) {
+        out.finish(&[])?;
     }
-    if let Some(file) = junit_file {
-        file.finish(junit(&cases).as_bytes())?;
-    }
-    Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
+    ended.map(|()| if told.failed { EXIT_FAILED } else { EXIT_HELD })
 }
 
 fn tell_table(rows: &[Row], cut: bool, streams: &mut Streams<'_>) -> Result<(), CliError> {

@@ -1,27 +1,28 @@
 //! `stress`: worlds by the thousand, each picked by its seed, each judged by every check.
 
-use std::io::BufRead;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use serde_json::{Value, json};
 
 use super::args::quoted;
+use super::files::Files;
+use super::merge::{self, Merged, merged};
+use super::out_file::OutFolder;
 use super::progress::progress_bar;
-use super::run::{Oracles, catch_interrupt, interrupted, pick_cullers};
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use super::run::{Oracles, pick_cullers};
+use super::signals::{catch_interrupt, interrupted};
+use super::{CliError, EXIT_FAILED, EXIT_HELD, EXIT_USAGE, Outputs, Streams};
 use crate::cull::{Culler, CullerKind, CullerSetup, Pen, View};
 use crate::oracle::{Oracle, OracleError, Questions, Stage};
 use crate::report::{difference_picture, picture_png};
 use crate::run::{FrameState, RunError, Truth, render};
 use crate::scene::{Scene, to_toml};
 use crate::stress::{
-    Choice, Judged, Outcome, Shard, Shrunk, Tally, VERSION, judged, judged_in, seed_of, shrink,
-    size,
+    Choice, Judged, Outcome, Shard, Shrunk, Tally, judged, judged_in, seed_of, shrink, size,
 };
 
 /// Seeds of a sweep where nothing is said.
@@ -67,15 +68,43 @@ pub(super) struct StressArgs {
     /// stands alone, a picture of the pixels that are missing, the line that runs it.
     #[arg(long, value_name = "FOLDER")]
     shrink: Option<PathBuf>,
-    /// Add up the lines of these files, that sweeps wrote with --out, and run nothing.
+    /// Add up the lines of these files, that sweeps wrote with --out, and run nothing. What is there twice is
+    /// refused; what is missing is named, and the exit code is 2 at best.
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["seeds", "seed", "shard", "budget", "out"])]
     merge: Vec<PathBuf>,
+    /// With --merge: missing shards and seeds are named, and the exit code is that of what is there.
+    #[arg(long, requires = "merge")]
+    partial: bool,
     /// One JSON object a world on standard output in place of the summary.
     #[arg(long)]
     json: bool,
-    /// Also write the JSON lines to this file.
-    #[arg(long, value_name = "FILE")]
+    /// Also write the JSON lines to this file, once the sweep ends; `-` is standard output, which has each
+    /// line as it comes, and the summary goes to standard error.
+    #[arg(long, value_name = "FILE|-")]
     out: Option<PathBuf>,
+}
+
+impl StressArgs {
+    pub(super) fn files(&self) -> Files {
+        Files::default()
+            .reading("--merge", self.merge.iter().map(PathBuf::as_path))
+            .writing("--out", self.out.as_deref())
+            .json(self.json)
+    }
+
+    /// The flags that decide what a seed is, each preceded by a space.
+    fn flags(&self) -> String {
+        let mut flags = String::new();
+        let mut add = |name: &str, values: &[String]| {
+            if !values.is_empty() {
+                flags += &format!(" --{name} {}", quoted(&values.join(",")));
+            }
+        };
+        add("culler", &self.culler);
+        add("oracle", &self.oracle);
+        add("adapter", self.adapter.as_slice());
+        flags
+    }
 }
 
 fn range(text: &str) -> Result<(u64, u64), String> {
@@ -107,7 +136,7 @@ enum End {
     Seeds,
     /// The budget.
     Time,
-    /// Ctrl-C.
+    /// A signal.
     Interrupted,
 }
 
@@ -141,23 +170,7 @@ impl Sweep<'_> {
     }
 
     fn replay(&self, seed: u64) -> String {
-        let mut line = format!("plainsight stress --seed {seed}");
-        let mut add = |name: &str, values: &[String]| {
-            if !values.is_empty() {
-                line += &format!(" --{name} {}", quoted(&values.join(",")));
-            }
-        };
-        add("culler", &self.args.culler);
-        add("oracle", &self.args.oracle);
-        add("adapter", self.args.adapter.as_slice());
-        line
-    }
-
-    fn line(outcome: &Outcome) -> String {
-        let mut line = serde_json::to_value(outcome).unwrap_or(Value::Null);
-        line["plainsight"] = json!("stress");
-        line["version"] = json!(VERSION);
-        line.to_string()
+        format!("plainsight stress --seed {seed}{}", self.args.flags())
     }
 
     /// Runs the seeds in order, chunk by chunk, until they, the time or the user's patience end.
@@ -181,11 +194,13 @@ impl Sweep<'_> {
             if chunk.is_empty() {
                 return Ok(End::Seeds);
             }
-            let outcomes: Vec<Result<Outcome, RunError>> = match self.real.is_empty() {
-                true => chunk.par_iter().map(|&seed| self.world(seed)).collect(),
-                false => chunk.iter().map(|&seed| self.world(seed)).collect(),
+            // A signal does not wait for the worlds that are still to come.
+            let world = |&seed: &u64| (!interrupted()).then(|| self.world(seed));
+            let outcomes: Vec<Option<Result<Outcome, RunError>>> = match self.real.is_empty() {
+                true => chunk.par_iter().map(world).collect(),
+                false => chunk.iter().map(world).collect(),
             };
-            for outcome in outcomes {
+            for outcome in outcomes.into_iter().flatten() {
                 let outcome = outcome?;
                 let replay = self.replay(outcome.seed);
                 each(&Outcome { replay, ..outcome })?;
@@ -200,7 +215,7 @@ impl Sweep<'_> {
     fn shrink(
         &self,
         seed: u64,
-        folder: &Path,
+        (folder, outputs): (&OutFolder, &mut Outputs<'_>),
         to: &mut dyn std::io::Write,
     ) -> Result<(), CliError> {
         let mut choice = Choice::of(seed, &self.cullers, &self.real);
@@ -231,10 +246,9 @@ impl Sweep<'_> {
         };
         let leaf_triangles = choice.partition.leaf_triangles;
         let small = Scene { name: format!("seed-{seed}"), leaf_triangles, ..small };
-        std::fs::create_dir_all(folder)
-            .map_err(|source| CliError::Write { path: folder.display().to_string(), source })?;
-        let file = folder.join(format!("seed-{seed}.toml"));
-        OutFile::create(&file)?.finish(to_toml(&small).as_bytes())?;
+        let name = format!("seed-{seed}.toml");
+        folder.file(outputs, &name)?.finish(to_toml(&small).as_bytes())?;
+        let file = folder.path().join(name);
         let [before, after] = [&scene, &small].map(size);
         writeln!(
             to,
@@ -256,7 +270,8 @@ impl Sweep<'_> {
             render(&world, &state, &drawn, &mut image);
             let picture = file.with_extension("png");
             let missing = difference_picture(&world, &truth.image, &image);
-            OutFile::create(&picture)?.finish(&picture_png(&missing))?;
+            let name = format!("seed-{seed}.png");
+            folder.file(outputs, &name)?.finish(&picture_png(&missing))?;
             outcome.failures.iter().try_for_each(|line| writeln!(to, "  {line}"))?;
             writeln!(to, "  picture: {}", picture.display())?;
         }
@@ -302,44 +317,101 @@ fn canary() -> Result<bool, CliError> {
     Ok(false)
 }
 
-/// Adds up the lines of files.
-pub(super) fn merged(files: &[PathBuf]) -> Result<Tally, CliError> {
-    let mut tally = Tally::default();
-    for path in files {
-        let refuse = |place: &str, what: String| {
-            CliError::Usage(format!("{}{place}: {what}", path.display()))
-        };
-        let file = std::fs::File::open(path).map_err(|error| refuse("", error.to_string()))?;
-        for (number, line) in (1..).zip(std::io::BufReader::new(file).lines()) {
-            let place = format!(" line {number}");
-            let line = line.map_err(|error| refuse(&place, error.to_string()))?;
-            let value: Value = serde_json::from_str(&line).map_err(|_| {
-                refuse(&place, "is no JSON; give files that stress --out wrote".to_owned())
-            })?;
-            if value["plainsight"] != json!("stress") || value["version"] != json!(VERSION) {
-                let what = format!(
-                    "is no line of stress, version {VERSION}; give files that stress --out wrote"
-                );
-                return Err(refuse(&place, what));
-            }
-            let outcome: Outcome =
-                serde_json::from_value(value).map_err(|error| refuse(&place, error.to_string()))?;
-            tally.add(&outcome);
-        }
-    }
-    Ok(tally)
+/// Adds up what others ran.
+fn merge_files(args: &StressArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+    let Merged { tally, missing } = merged(&args.merge)?;
+    let code = conclude(args, &tally, &missing, streams.out)?;
+    Ok(if code == EXIT_HELD && !missing.is_empty() && !args.partial { EXIT_USAGE } else { code })
 }
 
 pub(super) fn stress(
     args: &StressArgs,
     cullers: &[CullerKind],
+    outputs: &mut Outputs<'_>,
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
     if !args.merge.is_empty() {
-        let tally = merged(&args.merge)?;
-        return conclude(args, &tally, streams.out);
+        return merge_files(args, streams);
     }
-    let mut out = args.out.as_deref().map(OutFile::create).transpose()?;
+    let mut out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
+    let folder = args.shrink.as_deref().map(|path| outputs.folder("--shrink", path)).transpose()?;
+    let (sweep, whole, shard) = chosen(args, cullers, streams)?;
+    catch_interrupt();
+    let bar = progress_bar();
+    bar.set_style(
+        ProgressStyle::with_template(
+            "{msg:<20} {bar:30} {human_pos}/{human_len} worlds, {per_sec}, {eta} left",
+        )
+        .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    bar.set_length((whole.last - whole.first) / shard.count + 1);
+    if !canary()? {
+        writeln!(streams.out, "FAILED: the canary, a culler that draws nothing, was not reported")?;
+        return Ok(EXIT_FAILED);
+    }
+    let (mut tally, start) = (Tally::default(), Instant::now());
+    let own = (whole.first..=whole.last).skip(shard.index as usize).step_by(shard.count as usize);
+    let ran = sweep.run(own, &bar, &mut |outcome| {
+        tally.add(outcome);
+        if !outcome.failures.is_empty() {
+            bar.set_message(format!("{} FAILED", tally.failed));
+        }
+        let line = whole.line(outcome);
+        if args.json {
+            bar.suspend(|| writeln!(streams.out, "{line}"))?;
+        }
+        if let Some(out) = &mut out {
+            bar.suspend(|| out.line(&line))?;
+        }
+        Ok(())
+    });
+    bar.finish_and_clear();
+    // Whatever ended it, what was run is kept.
+    if let Some(out) = out.filter(|_| tally.worlds > 0) {
+        out.finish(&[])?;
+    }
+    let end = ran?;
+    let seconds = start.elapsed().as_secs_f64();
+    let to_talk = &mut *streams.talk;
+    let sink: &mut dyn std::io::Write = if args.json { to_talk } else { &mut *streams.out };
+    let rest = match end {
+        End::Interrupted if tally.worlds == 0 => return Err(RunError::Interrupted.into()),
+        End::Time if tally.worlds == 0 => {
+            let what = "--budget: the time was up before the first world was run; give it more";
+            return Err(CliError::Usage(what.to_owned()));
+        }
+        End::Seeds => "",
+        End::Time => "; the time was up before all seeds were run",
+        End::Interrupted => "; interrupted",
+    };
+    writeln!(
+        sink,
+        "{}, shard {shard}: {} worlds in {seconds:.1} s, {:.0} a second{rest}",
+        merge::seeds(whole.first, whole.last),
+        tally.worlds,
+        tally.worlds as f64 / seconds.max(1e-9)
+    )?;
+    if args.seed.is_some()
+        && let Some(only) = &tally.worst_excess
+    {
+        writeln!(sink, "seed {}: {}; {}", only.seed, only.scene, only.options)?;
+    }
+    let code = conclude(args, &tally, &[], sink)?;
+    if end == End::Interrupted {
+        return Err(RunError::Interrupted.into());
+    }
+    if let (Some(folder), Some(failure)) = (&folder, tally.failures.first()) {
+        sweep.shrink(failure.seed, (folder, outputs), sink)?;
+    }
+    Ok(code)
+}
+
+/// What the arguments ask for: the sweep, what its lines say of it, and this machine's share.
+fn chosen<'a>(
+    args: &'a StressArgs,
+    cullers: &[CullerKind],
+    streams: &mut Streams<'_>,
+) -> Result<(Sweep<'a>, merge::Sweep, Shard), CliError> {
     Oracles::known(&args.oracle)?;
     let real: Vec<Questions> = args.oracle.iter().filter_map(|name| Questions::of(name)).collect();
     if real.len() < args.oracle.len() {
@@ -351,82 +423,38 @@ pub(super) fn stress(
         true => cullers.to_vec(),
         false => pick_cullers(&args.culler, cullers)?,
     };
+    let (first, last) = match args.seed {
+        Some(seed) => (seed, seed),
+        None => args.seeds.map_or((DEFAULT_SEEDS.0, DEFAULT_SEEDS.1 - 1), |(a, b)| (a, b - 1)),
+    };
+    let shard = match args.shard {
+        Some(shard) => shard,
+        None if args.seed.is_some() => Shard::WHOLE,
+        None => Shard::of_environment(|name| std::env::var(name).ok())
+            .map_err(|error| CliError::Usage(error.to_string()))?,
+    };
+    if shard.index > last - first {
+        let seeds = merge::seeds(first, last);
+        return Err(CliError::Usage(format!(
+            "shard {shard} of {seeds} is empty: there are fewer seeds than shards; ask for fewer shards"
+        )));
+    }
     // No real device is opened where none is asked for.
     let names = if real.is_empty() { vec!["sim".to_owned()] } else { args.oracle.clone() };
     let adapter = args.adapter.as_deref().filter(|_| !real.is_empty());
     let oracles = Oracles::open(&names, adapter, streams)?;
-    let shard = match args.shard {
-        Some(shard) => shard,
-        None => Shard::of_environment(|name| std::env::var(name).ok())
-            .map_err(|error| CliError::Usage(error.to_string()))?,
-    };
-    let (from, to) = match args.seed {
-        Some(seed) => (seed, seed + 1),
-        None => args.seeds.unwrap_or(DEFAULT_SEEDS),
-    };
-    let shard = if args.seed.is_some() { Shard::WHOLE } else { shard };
-    catch_interrupt();
-    let bar = progress_bar();
-    bar.set_style(
-        ProgressStyle::with_template(
-            "{msg:<20} {bar:30} {human_pos}/{human_len} worlds, {per_sec}, {eta} left",
-        )
-        .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
-    bar.set_length((to - from).div_ceil(shard.count));
-    let sweep = Sweep { args, cullers, real, oracles };
-    if !canary()? {
-        writeln!(streams.out, "FAILED: the canary, a culler that draws nothing, was not reported")?;
-        return Ok(EXIT_FAILED);
-    }
-    let (mut tally, start) = (Tally::default(), Instant::now());
-    let ran = sweep.run(shard.seeds(from, to), &bar, &mut |outcome| {
-        tally.add(outcome);
-        if !outcome.failures.is_empty() {
-            bar.set_message(format!("{} FAILED", tally.failed));
-        }
-        let line = Sweep::line(outcome);
-        if args.json {
-            bar.suspend(|| writeln!(streams.out, "{line}"))?;
-        }
-        if let Some(out) = &mut out {
-            out.line(&line)?;
-        }
-        Ok(())
-    });
-    bar.finish_and_clear();
-    let end = ran?;
-    let seconds = start.elapsed().as_secs_f64();
-    let to_talk = &mut *streams.talk;
-    let sink: &mut dyn std::io::Write = if args.json { to_talk } else { &mut *streams.out };
-    let rest = match end {
-        End::Seeds => "",
-        End::Time => "; the time was up before all seeds were run",
-        End::Interrupted => "; interrupted",
-    };
-    writeln!(
-        sink,
-        "seeds {from}..{to}, shard {shard}: {} worlds in {seconds:.1} s, {:.0} a second{rest}",
-        tally.worlds,
-        tally.worlds as f64 / seconds.max(1e-9)
-    )?;
-    if args.seed.is_some()
-        && let Some(only) = &tally.worst_excess
-    {
-        writeln!(sink, "seed {}: {}; {}", only.seed, only.scene, only.options)?;
-    }
-    let code = conclude(args, &tally, sink)?;
-    if let (Some(folder), Some(failure)) = (&args.shrink, tally.failures.first()) {
-        sweep.shrink(failure.seed, folder, sink)?;
-    }
-    if let Some(out) = out {
-        out.finish(b"")?;
-    }
-    Ok(if end == End::Interrupted { super::EXIT_INTERRUPTED } else { code })
+    let flags = args.flags().trim_start().to_owned();
+    let whole = merge::Sweep { flags, first, last, shards: shard.count, shard: shard.index };
+    Ok((Sweep { args, cullers, real, oracles }, whole, shard))
 }
 
 /// What a sweep came to.
-fn conclude(args: &StressArgs, tally: &Tally, to: &mut dyn std::io::Write) -> Result<u8, CliError> {
+fn conclude(
+    args: &StressArgs,
+    tally: &Tally,
+    missing: &[String],
+    to: &mut dyn std::io::Write,
+) -> Result<u8, CliError> {
     writeln!(
         to,
         "{} worlds, {} frames, {} worlds run twice",
@@ -464,8 +492,14 @@ fn conclude(args: &StressArgs, tally: &Tally, to: &mut dyn std::io::Write) -> Re
     if args.every_probe {
         never.iter().try_for_each(|probe| writeln!(to, "NEVER REACHED: {probe}"))?;
     }
+    missing.iter().try_for_each(|what| writeln!(to, "MISSING: {what}"))?;
     let held = tally.failed == 0 && (never.is_empty() || !args.every_probe);
-    let word = if held { "held" } else { "failed" };
+    let word = match (held, missing) {
+        (false, _) => "failed",
+        (true, []) => "held",
+        (true, _) if args.partial => "held as far as it goes",
+        (true, _) => "incomplete; --partial judges what is there",
+    };
     writeln!(
         to,
         "verdict: {word} ({} of {} worlds held)",

@@ -5,10 +5,10 @@ use clap::Args;
 use serde_json::json;
 
 use super::args::{CompareArgs, SceneArgs};
-use super::compare::folder;
 use super::progress::{counting_triangles, progress_bar};
-use super::run::{Named, catch_interrupt, interrupted, matching};
-use super::{CliError, EXIT_HELD, OutFile, Streams};
+use super::run::{Named, matching};
+use super::signals::{catch_interrupt, interrupted, stoppable};
+use super::{CliError, EXIT_HELD, OutFile, Outputs, Streams};
 use crate::part::PartitionKnobs;
 use crate::report::{
     claims, found_table, found_view, picture_png, time_table, work_table, wrapped,
@@ -53,9 +53,10 @@ fn open(tuned: &Tuned, args: &SceneArgs, bar: &indicatif::ProgressBar) -> Result
     args.frames = args.frames.or(Some(FRAMES));
     let scene = Named::open(tuned.scene, &args)?.scene().clone();
     // Nothing is asked of parts: objects stay whole.
-    Ok(counting_triangles(bar, tuned.scene.to_owned(), |progress| {
+    let make = |progress: &(dyn Fn(u64, u64) + Sync)| {
         World::make(scene, PartitionKnobs::uncut(), None, progress)
-    }))
+    };
+    Ok(stoppable(|| counting_triangles(bar, tuned.scene.to_owned(), make))?)
 }
 
 fn title(world: &World) -> String {
@@ -69,43 +70,79 @@ fn title(world: &World) -> String {
     )
 }
 
-pub(super) fn compare(args: &CompareArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
+pub(super) fn compare(
+    args: &CompareArgs,
+    outputs: &mut Outputs<'_>,
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
     let scenes = scenes(&args.scene)?;
-    let out = folder(&args.out)?;
+    let out = outputs.folder("--out", &args.out)?;
+    let mut lines = out.file(outputs, "surveys.jsonl")?;
+    let mut files: Vec<[OutFile<'_>; 3]> = Vec::new();
+    for tuned in &scenes {
+        let mut file = |(_, view)| out.file(outputs, &format!("{}-{view}.png", tuned.scene));
+        files.push([file(VIEWS[0])?, file(VIEWS[1])?, file(VIEWS[2])?]);
+    }
     catch_interrupt();
     let bar = progress_bar();
-    let mut lines = String::new();
-    for tuned in scenes {
-        let world = open(tuned, &args.scene_args, &bar)?;
-        let knobs = SurveyKnobs {
-            frames: world.scene.frames,
-            render_every: RENDER_EVERY,
-            check_every: CHECK_EVERY,
+    let mut done = 0;
+    let ended = scenes.iter().zip(files).try_for_each(|(tuned, files)| {
+        survey_scene(args, tuned, (&mut lines, files), &bar, streams)?;
+        done += 1;
+        Ok::<(), CliError>(())
+    });
+    bar.finish_and_clear();
+    if ended.is_ok() || done > 0 {
+        lines.finish(&[])?;
+        let to = if args.json { &mut streams.talk } else { &mut streams.out };
+        let folder = out.path().display();
+        writeln!(to, "views from above and figures as JSON lines are in {folder}")?;
+    }
+    ended.map(|()| EXIT_HELD)
+}
+
+/// The tables, lines and views of one scene.
+fn survey_scene(
+    args: &CompareArgs,
+    tuned: &Tuned,
+    (lines, files): (&mut OutFile<'_>, [OutFile<'_>; 3]),
+    bar: &indicatif::ProgressBar,
+    streams: &mut Streams<'_>,
+) -> Result<(), CliError> {
+    let world = open(tuned, &args.scene_args, bar)?;
+    let knobs = SurveyKnobs {
+        frames: world.scene.frames,
+        render_every: RENDER_EVERY,
+        check_every: CHECK_EVERY,
+    };
+    let mut all = contenders(tuned, args.thesis_knobs);
+    if args.beyond {
+        all.extend(beyond(tuned));
+    }
+    bar.set_length(u64::from(knobs.frames) * all.len() as u64);
+    bar.set_position(0);
+    bar.reset_eta();
+    let mut surveys: Vec<Survey> = Vec::new();
+    for contender in &all {
+        bar.set_message(format!("{} {}", tuned.scene, contender.name));
+        let mut tick = || {
+            bar.inc(1);
+            !interrupted()
         };
-        let mut all = contenders(tuned, args.thesis_knobs);
-        if args.beyond {
-            all.extend(beyond(tuned));
+        let done = survey(&world, contender, &knobs, &mut tick);
+        surveys.push(done.ok_or(RunError::Interrupted)?);
+    }
+    for survey in &surveys {
+        let mut line = serde_json::to_value(survey).unwrap_or_default();
+        line["plainsight"] = json!("survey");
+        line["version"] = json!(VERSION);
+        if args.json {
+            bar.suspend(|| writeln!(streams.out, "{line}"))?;
         }
-        bar.set_length(u64::from(knobs.frames) * all.len() as u64);
-        bar.set_position(0);
-        bar.reset_eta();
-        let mut surveys: Vec<Survey> = Vec::new();
-        for contender in &all {
-            bar.set_message(format!("{} {}", tuned.scene, contender.name));
-            let mut tick = || {
-                bar.inc(1);
-                !interrupted()
-            };
-            let done = survey(&world, contender, &knobs, &mut tick);
-            surveys.push(done.ok_or(RunError::Interrupted)?);
-        }
-        for survey in &surveys {
-            let mut line = serde_json::to_value(survey).unwrap_or_default();
-            line["plainsight"] = json!("survey");
-            line["version"] = json!(VERSION);
-            lines += &format!("{line}\n");
-        }
-        let width = streams.width.filter(|_| !args.json);
+        lines.line(&line.to_string())?;
+    }
+    if !args.json {
+        let width = streams.width;
         let text = [
             wrapped(&title(&world), width),
             time_table(&surveys, width),
@@ -113,26 +150,15 @@ pub(super) fn compare(args: &CompareArgs, streams: &mut Streams<'_>) -> Result<u
             work_table(&surveys, width),
             claims(&surveys, width),
         ];
-        if !args.json {
-            bar.suspend(|| writeln!(streams.out, "{}\n", text.join("\n")))?;
-        }
-        for (name, file) in VIEWS {
-            let Some(contender) = all.iter().find(|contender| contender.name == name) else {
-                continue;
-            };
+        bar.suspend(|| writeln!(streams.out, "{}\n", text.join("\n")))?;
+    }
+    for ((name, _), file) in VIEWS.into_iter().zip(files) {
+        if let Some(contender) = all.iter().find(|contender| contender.name == name) {
             let picture = found_view(&look(&world, contender, 0), world.scene.viewport, VIEW_SIDE);
-            let path = out.join(format!("{}-{file}.png", tuned.scene));
-            OutFile::create(&path)?.finish(&picture_png(&picture))?;
+            file.finish(&picture_png(&picture))?;
         }
     }
-    bar.finish_and_clear();
-    if args.json {
-        write!(streams.out, "{lines}")?;
-    }
-    OutFile::create(&out.join("surveys.jsonl"))?.finish(lines.as_bytes())?;
-    let to = if args.json { &mut streams.talk } else { &mut streams.out };
-    writeln!(to, "views from above and figures as JSON lines are in {}", out.display())?;
-    Ok(EXIT_HELD)
+    Ok(())
 }
 
 #[derive(Args, Clone)]

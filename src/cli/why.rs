@@ -6,10 +6,11 @@ use clap::Args;
 use serde_json::json;
 
 use super::args::SceneArgs;
+use super::files::Files;
 use super::picture::{moment_of, named_after};
 use super::progress::progress_bar;
 use super::run::{catch_interrupt, interrupted, one_lane};
-use super::{CliError, EXIT_HELD, OutFile, Streams};
+use super::{CliError, EXIT_HELD, Outputs, Streams};
 use crate::cull::CullerKind;
 use crate::part::PartId;
 use crate::report::{
@@ -48,9 +49,18 @@ pub(super) struct WhyArgs {
     /// One JSON object in place of the text.
     #[arg(long)]
     json: bool,
-    /// The PNG file (default: SCENE-FRAME-part-ID.png).
-    #[arg(long, value_name = "FILE.png")]
+    /// The PNG file (default: SCENE-FRAME-part-ID.png); `-` is standard output, and the text goes to
+    /// standard error.
+    #[arg(long, value_name = "FILE.png|-")]
     out: Option<PathBuf>,
+}
+
+impl WhyArgs {
+    pub(super) fn files(&self) -> Files {
+        Files::of_scenes(std::slice::from_ref(&self.scene), &self.scene_args)
+            .writing("--out", self.out.as_deref())
+            .json(self.json)
+    }
 }
 
 fn pixel(text: &str) -> Result<[u32; 2], String> {
@@ -63,8 +73,10 @@ fn pixel(text: &str) -> Result<[u32; 2], String> {
 pub(super) fn why(
     args: &WhyArgs,
     cullers: &[CullerKind],
+    outputs: &mut Outputs<'_>,
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
+    let named_file = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
     let scene_args = args.scene_args.clone();
     let lane = (args.scene.as_str(), &args.culler, &args.oracle);
     let (plan, named) = one_lane(lane, &scene_args, cullers, streams)?;
@@ -77,7 +89,7 @@ pub(super) fn why(
     let part = part_of(args, &world, moment)?;
     let own_name = || named_after(&args.scene, &format!("{}-part-{}.png", args.frame, part.0));
     let path = args.out.clone().unwrap_or_else(own_name);
-    let out = OutFile::create(&path)?;
+    let out = named_file.map_or_else(|| outputs.file("--out", &path), Ok)?;
     let bar = progress_bar();
     bar.inc_length((u64::from(moment.frame) + 1) * u64::from(world.views()));
     let mut tick = || {

@@ -254,6 +254,9 @@ impl Comparison<'_> {
         text
     }
 
+    /// The stems of the file names of [`Comparison::charts`].
+    pub const CHARTS: [&'static str; 4] = ["time", "fps", "parts", "queries"];
+
     /// Figures 6 to 9, by the stems of their file names.
     #[must_use]
     pub fn charts(&self) -> [(&'static str, Chart); 4] {
@@ -275,12 +278,13 @@ impl Comparison<'_> {
             let values = first.frames.iter().map(|f| f64::from(f.visible_parts)).collect();
             parts.series.push(Series { name: "visible".to_owned(), values });
         }
+        let [time, fps, drawn, queries] = Self::CHARTS;
         [
-            ("time", chart("rendering time (Figure 6)", "ms", &wall_ms)),
-            ("fps", chart("rendering speed (Figure 7)", "frames a second", &|f| 1e3 / wall_ms(f))),
-            ("parts", parts),
+            (time, chart("rendering time (Figure 6)", "ms", &wall_ms)),
+            (fps, chart("rendering speed (Figure 7)", "frames a second", &|f| 1e3 / wall_ms(f))),
+            (drawn, parts),
             (
-                "queries",
+                queries,
                 chart("occlusion queries (Figure 9)", "queries", &|f| f.counts.queries as f64),
             ),
         ]

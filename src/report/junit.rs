@@ -1,4 +1,5 @@
-//! JUnit XML, which CI systems read: a suite a scene, a case a lane, a failure where the gate says so.
+//! JUnit XML, which CI systems read: a suite a scene, a case a lane, a failure where the gate says so, an
+//! error where there was no verdict.
 
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event};
 use quick_xml::writer::Writer;
@@ -14,6 +15,8 @@ pub struct JunitCase {
     pub seconds: f64,
     /// What the gate says, a line each, the replay line last; none where it held.
     pub failures: Vec<String>,
+    /// What kept it from a verdict, a line each, the replay line last; none where it came to one.
+    pub errors: Vec<String>,
 }
 
 /// What XML 1.0 has no place for.
@@ -31,12 +34,15 @@ pub fn junit(cases: &[JunitCase]) -> String {
     write(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)));
     let counts = |cases: &[JunitCase]| {
         let failed = cases.iter().filter(|case| !case.failures.is_empty()).count();
+        let broken = cases.iter().filter(|case| !case.errors.is_empty()).count();
         let seconds: f64 = cases.iter().map(|case| case.seconds).sum();
-        (cases.len().to_string(), failed.to_string(), format!("{seconds:.3}"))
+        let [tests, failed, broken] = [cases.len(), failed, broken].map(|count| count.to_string());
+        (tests, failed, broken, format!("{seconds:.3}"))
     };
     let open = |element: &'static str, name: &str, cases: &[JunitCase]| {
-        let (tests, failures, time) = counts(cases);
-        let attributes = [("tests", tests), ("failures", failures), ("time", time)];
+        let (tests, failures, errors, time) = counts(cases);
+        let attributes =
+            [("tests", tests), ("failures", failures), ("errors", errors), ("time", time)];
         let mut start = BytesStart::new(element);
         start.push_attribute(("name", clean(name).as_str()));
         for (key, value) in &attributes {
@@ -52,16 +58,19 @@ pub fn junit(cases: &[JunitCase]) -> String {
             start.push_attribute(("classname", clean(&case.scene).as_str()));
             start.push_attribute(("name", clean(&case.name).as_str()));
             start.push_attribute(("time", format!("{:.3}", case.seconds).as_str()));
-            let Some(first) = case.failures.first() else {
+            if case.failures.is_empty() && case.errors.is_empty() {
                 write(Event::Empty(start));
                 continue;
-            };
+            }
             write(Event::Start(start));
-            let mut failure = BytesStart::new("failure");
-            failure.push_attribute(("message", clean(first).as_str()));
-            write(Event::Start(failure));
-            write(Event::Text(BytesText::new(&clean(&case.failures.join("\n")))));
-            write(Event::End(BytesEnd::new("failure")));
+            for (element, lines) in [("failure", &case.failures), ("error", &case.errors)] {
+                let Some(first) = lines.first() else { continue };
+                let mut start = BytesStart::new(element);
+                start.push_attribute(("message", clean(first).as_str()));
+                write(Event::Start(start));
+                write(Event::Text(BytesText::new(&clean(&lines.join("\n")))));
+                write(Event::End(BytesEnd::new(element)));
+            }
             write(Event::End(BytesEnd::new("testcase")));
         }
         write(Event::End(BytesEnd::new("testsuite")));
@@ -88,8 +97,11 @@ mod tests {
             name: format!("full@sim {nasty}"),
             seconds: 0.5,
             failures: failures.iter().map(|&line| line.to_owned()).collect(),
+            errors: Vec::new(),
         };
-        let cases = [case("one", &[]), case("one", &[nasty, "replay: x"]), case("two", &[])];
+        let broken = JunitCase { errors: vec!["lost <it>".to_owned()], ..case("two", &[]) };
+        let cases =
+            [case("one", &[]), case("one", &[nasty, "replay: x"]), case("two", &[]), broken];
         let text = junit(&cases);
         let mut reader = Reader::from_str(&text);
         let (mut names, mut texts, mut unescaped) = (Vec::new(), Vec::new(), String::new());
@@ -116,11 +128,15 @@ mod tests {
             }
         }
         let expected =
-            ["testsuites", "testsuite", "testcase", "testcase", "failure", "testsuite", "testcase"];
-        assert_eq!(names, expected);
+            "testsuites testsuite testcase testcase failure testsuite testcase testcase error";
+        assert_eq!(names.join(" "), expected);
         let shown = nasty.replace('\u{1}', "\u{fffd}");
-        assert_eq!(texts, [shown]);
+        assert_eq!(texts, [shown, "lost <it>".to_owned()]);
         assert!(unescaped.contains("replay: x"), "{unescaped}");
-        assert!(text.contains("name=\"one\" tests=\"2\" failures=\"1\" time=\"1.000\""), "{text}");
+        assert!(
+            text.contains("name=\"one\" tests=\"2\" failures=\"1\" errors=\"0\" time=\"1.000\""),
+            "{text}"
+        );
+        assert!(text.contains("name=\"two\" tests=\"2\" failures=\"0\" errors=\"1\""), "{text}");
     }
 }

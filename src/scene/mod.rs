@@ -10,6 +10,7 @@ pub mod file;
 pub mod generate;
 pub mod import;
 mod inline_motion;
+mod sources;
 mod stream;
 mod write;
 
@@ -20,6 +21,8 @@ use glam::{DMat3, DMat4, DQuat, DVec3};
 pub use plainsight_reference::{DepthOrder, Viewport};
 
 pub use camera::{Camera, CameraPath, CameraPose, Lens, Travel};
+pub use generate::is_scene_file;
+pub use sources::sources;
 pub use stream::Stream;
 pub use write::to_toml;
 

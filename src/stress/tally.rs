@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Outcome, Probe};
 
 /// Version of the lines.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// Failing seeds kept; the others are only counted.
 const KEPT_FAILURES: usize = 100;
 

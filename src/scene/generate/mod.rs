@@ -257,13 +257,19 @@ pub fn matching(pattern: &str) -> Result<Vec<String>, SceneError> {
     Ok(found)
 }
 
+/// Whether a scene's name is that of a file: it ends in `.toml`.
+#[must_use]
+pub fn is_scene_file(name: &str) -> bool {
+    name.to_ascii_lowercase().ends_with(".toml")
+}
+
 /// A generator's scene or, for a name that ends in `.toml`, that file's; knobs given here win over
 /// the file's.
 ///
 /// # Errors
 /// As [`build`] and [`file::load`].
 pub fn open(name_or_file: &str, knobs: &Knobs) -> Result<Scene, SceneError> {
-    if name_or_file.to_ascii_lowercase().ends_with(".toml") {
+    if is_scene_file(name_or_file) {
         file::load(name_or_file.as_ref(), knobs)
     } else {
         build(name_or_file, knobs)
