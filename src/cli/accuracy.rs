@@ -9,12 +9,14 @@ use serde_json::{Value, json};
 use super::args::SceneArgs;
 use super::compare::folder;
 use super::progress::{counting_triangles, progress_bar};
-use super::run::{Named, catch_interrupt, interrupted, matching, pick_cache, pick_cost};
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use super::run::{Named, catch_interrupt, exit_of, interrupted, matching, pick_cache, pick_cost};
+use super::watchdog::Watchdog;
+use super::{CliError, EXIT_HELD, OutFile, Streams};
 use crate::accuracy::{
     EffectPoint, KNOBS, Point, RendererPoint, Worlds, effects, findings, measure, renderers,
     settings,
 };
+use crate::check::Ruling;
 use crate::effect::EFFECTS;
 use crate::report::{
     accuracy_chart, accuracy_table, effect_table, picture_png, renderer_table, wrapped,
@@ -122,7 +124,8 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
     bar.set_length(scenes.iter().map(of_scene).sum());
     let mut lines: Vec<String> = Vec::new();
     let mut words = format!("# What accuracy costs in time\n\nCost model: {}.\n", cost.name);
-    let mut failed = false;
+    let mut ruling = Ruling::Held;
+    let watchdog = Watchdog::start(&args.scene_args.frame_limit, |_| {});
     for scene in &scenes {
         bar.set_message(scene.name.clone());
         let mut tick = || {
@@ -137,7 +140,7 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
             });
             warnings.borrow_mut().extend(world.made.warnings.iter().cloned());
             bar.set_message(name);
-            world
+            world.with_canary(args.scene_args.canary)
         };
         let worlds = Worlds::new(scene.clone(), &make);
         let points = measure(&worlds, &cost, args.rounds, &settings, &mut tick)?;
@@ -150,7 +153,8 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
             bar.suspend(|| writeln!(streams.talk, "WARNING: {line}"))?;
         }
         let figures = Figures { points, renderers, effects };
-        failed |= bar.suspend(|| tell(args, scene, &figures, &mut words, streams))?;
+        let told = bar.suspend(|| tell(args, scene, &figures, &mut words, streams))?;
+        ruling = ruling.max(told);
         lines.extend(figures.points.iter().map(|point| line("accuracy", point)));
         lines.extend(figures.renderers.iter().map(|point| line("accuracy renderer", point)));
         lines.extend(figures.effects.iter().map(|point| line("accuracy effects", point)));
@@ -160,11 +164,17 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
         OutFile::create(&path("svg"))?.finish(chart.svg().as_bytes())?;
         OutFile::create(&path("png"))?.finish(&picture_png(&chart.png()))?;
     }
+    drop(watchdog);
     bar.finish_and_clear();
     OutFile::create(&out.join("points.jsonl"))?.finish((lines.join("\n") + "\n").as_bytes())?;
     OutFile::create(&out.join("findings.md"))?.finish(words.as_bytes())?;
     let to = if args.json { &mut streams.talk } else { &mut streams.out };
-    let word = if failed { "FAILED: a setting that takes nothing lost something" } else { "held" };
+    let word = match ruling {
+        Ruling::Failed => {
+            "FAILED: a setting that takes nothing lost something, or some other broke"
+        }
+        other => other.word(),
+    };
     let seconds = bar.elapsed().as_secs_f64();
     writeln!(
         to,
@@ -173,17 +183,17 @@ pub(super) fn accuracy(args: &AccuracyArgs, streams: &mut Streams<'_>) -> Result
         scenes.len(),
         out.display()
     )?;
-    Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
+    Ok(exit_of(ruling))
 }
 
-/// The tables of a scene and its findings; whether a sound setting lost anything.
+/// The tables of a scene and its findings; what the worst of its settings came to.
 fn tell(
     args: &AccuracyArgs,
     scene: &Scene,
     Figures { points, renderers, effects }: &Figures,
     words: &mut String,
     streams: &mut Streams<'_>,
-) -> Result<bool, CliError> {
+) -> Result<Ruling, CliError> {
     let Viewport { width, height } = scene.viewport;
     let title = format!(
         "{}, seed {}: {} objects, {} triangles, {} frames of {width}x{height}",
@@ -214,12 +224,12 @@ fn tell(
             writeln!(streams.out, "{}\n", wrapped(finding, width))?;
         }
     }
-    let mut failed = false;
+    let mut ruling = Ruling::Held;
     for point in points.iter().filter(|point| !point.failures.is_empty()) {
-        failed = true;
+        ruling = ruling.max(Ruling::of(&point.verdict).unwrap_or(Ruling::Failed));
         for failure in &point.failures {
             writeln!(streams.talk, "{} {} {}: {failure}", scene.name, point.knob, point.value)?;
         }
     }
-    Ok(failed)
+    Ok(ruling)
 }

@@ -5,15 +5,17 @@ use std::path::{Path, PathBuf};
 use super::args::{CompareArgs, SceneArgs};
 use super::progress::progress_bar;
 use super::run::{
-    Finished, Named, Oracles, Plan, REPEAT, catch_interrupt, matching, pick_cache, pick_cost,
-    pick_cullers, pick_index, tell_failures,
+    Finished, Named, Oracles, Plan, catch_interrupt, exit_of, loud, matching, pick_cache,
+    pick_cost, pick_cullers, pick_index, tell_failures,
 };
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use super::watchdog::Watchdog;
+use super::{CliError, OutFile, Streams};
+use crate::check::Ruling;
 use crate::cull::CullerKind;
 use crate::oracle::CostModel;
 use crate::part::Made;
 use crate::report::{Comparison, picture_png, wrapped};
-use crate::run::{FrameState, Moment, Repeat, Trace, depth_complexity};
+use crate::run::{FrameState, Moment, Trace, depth_complexity};
 
 /// The scenes of the paper.
 const SCENES: [&str; 2] = ["powerplant", "bunnies"];
@@ -105,15 +107,13 @@ pub(super) fn compare(
     let oracles =
         Oracles::open(&args.oracle, adapter, streams)?.simulating(&cost, &args.scene_args);
     let out = folder(&args.out)?;
-    let repeat = match args.rounds {
-        1 => REPEAT,
-        rounds => Repeat { frames: u32::MAX, rounds: rounds - 1 },
-    };
     let (cullers, with_bound, args_of) = (chosen, true, &args.scene_args);
+    let repeat = args.repeat;
     let mut plan = Plan { cullers, index, oracles, cost, cache, repeat, with_bound, args: args_of };
     catch_interrupt();
     let bar = progress_bar();
-    let (mut failed, mut csv) = (false, String::new());
+    let watchdog = Watchdog::start(&args.scene_args.frame_limit, |_| {});
+    let (mut ruling, mut csv) = (Ruling::Held, String::new());
     for case in &cases {
         plan.args = &case.args;
         let finished = plan.run_after(&case.named, &bar, streams, &mut |world, streams| {
@@ -144,18 +144,18 @@ pub(super) fn compare(
             let _ = std::fs::remove_dir(&out);
         }
         let finished = finished?;
-        failed |=
-            tell_case(case, &finished, &plan.cost, (&out, &mut csv, args.json), streams, &bar)?;
+        ruling = ruling.max(finished.ruling());
+        tell_case(case, &finished, &plan.cost, (&out, &mut csv, args.json), streams, &bar)?;
     }
+    drop(watchdog);
     bar.finish_and_clear();
     OutFile::create(&out.join("series.csv"))?.finish(csv.as_bytes())?;
-    let word = if failed { "FAILED" } else { "held" };
     let to = if args.json { &mut streams.talk } else { &mut streams.out };
-    writeln!(to, "verdict: {word}; figures and series in {}", out.display())?;
-    Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
+    writeln!(to, "verdict: {}; figures and series in {}", loud(ruling), out.display())?;
+    Ok(exit_of(ruling))
 }
 
-/// Tables, failures and figures of one case; whether anything failed.
+/// Tables, failures and figures of one case.
 fn tell_case(
     case: &Case,
     finished: &Finished,
@@ -163,11 +163,9 @@ fn tell_case(
     (out, csv, json): (&Path, &mut String, bool),
     streams: &mut Streams<'_>,
     bar: &indicatif::ProgressBar,
-) -> Result<bool, CliError> {
-    let mut failed = false;
-    for (trace, gate) in finished.traces.iter().zip(&finished.gates) {
-        failed |= !gate.held();
-        bar.suspend(|| tell_failures(gate, trace, streams))?;
+) -> Result<(), CliError> {
+    for lane in finished.lanes() {
+        bar.suspend(|| tell_failures(lane, streams))?;
     }
     let mut oracles: Vec<&str> = Vec::new();
     for trace in &finished.traces {
@@ -198,7 +196,7 @@ fn tell_case(
             }
         }
     }
-    Ok(failed)
+    Ok(())
 }
 
 /// How the object trees were come by.

@@ -2,24 +2,27 @@
 //! input, or from a process that is told each frame and asked what it draws. The format stands at the top
 //! of `crate::foreign`.
 
-use std::io::{BufReader, BufWriter, Write};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use clap::Args;
 use plainsight_reference::Tolerance;
 
 use super::args::{SceneArgs, quoted};
+use super::pipe::Process;
 use super::progress::progress_bar;
-use super::run::{Named, catch_interrupt, interrupted, pick_cache};
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use super::run::{
+    Named, catch_interrupt, exit_of, failure_lines, interrupted, junit_case, pick_cache,
+};
+use super::tell::heading;
+use super::{CliError, OutFile, Streams};
 use crate::check::Gate;
 use crate::foreign::{Drawn, ForeignError, frame_line, header_line};
 use crate::part::PartId;
-use crate::report::{JunitCase, Row, Shown, junit, part_picture, picture_png, table, top_view};
+use crate::report::{Row, Shown, junit, part_picture, picture_png, table, top_view};
 use crate::run::{
-    FrameRecord, FrameState, LaneInfo, Moment, Observer, RunError, Trace, Truth, World,
-    partition_difference, render, told,
+    Cause, FrameRecord, FrameState, LaneInfo, Moment, Observer, RunError, Stop, Trace, Truth,
+    World, partition_difference, render, told,
 };
 
 /// Pixels along a side of the view from above.
@@ -55,55 +58,6 @@ impl From<ForeignError> for CliError {
     }
 }
 
-/// A started culler.
-struct Process {
-    child: Child,
-    tell: Option<BufWriter<ChildStdin>>,
-    command: String,
-}
-
-impl Process {
-    fn start(command: &str) -> Result<(Self, ChildStdout), CliError> {
-        let started = Command::new("sh")
-            .args(["-c", command])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn();
-        let mut child = started.map_err(|error| {
-            CliError::Usage(format!("--pipe {}: cannot be started: {error}", quoted(command)))
-        })?;
-        let tell = child.stdin.take().map(BufWriter::new);
-        let answers = child.stdout.take().expect("its output is piped");
-        Ok((Self { child, tell, command: command.to_owned() }, answers))
-    }
-
-    /// Writes a line and sees that it gets there.
-    fn tell(&mut self, line: &str) -> Result<(), CliError> {
-        let tell = self.tell.as_mut().expect("nothing is told after the end");
-        let told = tell.write_all(line.as_bytes()).and_then(|()| tell.write_all(b"\n"));
-        told.and_then(|()| tell.flush()).map_err(|error| self.stopped(&error.to_string()))
-    }
-
-    fn stopped(&mut self, what: &str) -> CliError {
-        // What it was asked to read is closed, so that it ends by itself if it has not.
-        self.tell = None;
-        let status = self.child.wait().map_or_else(|error| error.to_string(), |s| s.to_string());
-        let command = quoted(&self.command);
-        CliError::Usage(format!(
-            "--pipe {command}: stopped before the last frame ({status}): {what}"
-        ))
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        self.tell = None;
-        // After an error it may not have ended.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
 /// The first bad frame with what was drawn in it.
 type Worst = Option<(Moment, Vec<PartId>)>;
 
@@ -119,6 +73,10 @@ impl Observer for Watch {
         if self.worst.is_none() && !self.gate.held() {
             self.worst = Some((record.state.moment, record.drawn.to_vec()));
         }
+    }
+
+    fn stopped(&mut self, stop: &Stop) {
+        self.gate.stopped(stop);
     }
 }
 
@@ -143,7 +101,8 @@ pub(super) fn judge(args: &JudgeArgs, streams: &mut Streams<'_>) -> Result<u8, C
     let mut drawn = match (file, &args.pipe) {
         (Some(file), _) => Drawn::new(BufReader::new(file), name),
         (None, Some(command)) => {
-            let (started, answers) = Process::start(command)?;
+            let limit = args.scene_args.frame_limit.time();
+            let (started, answers) = Process::start(command, limit)?;
             process = Some(started);
             Drawn::new(BufReader::new(answers), name)
         }
@@ -161,7 +120,7 @@ pub(super) fn judge(args: &JudgeArgs, streams: &mut Streams<'_>) -> Result<u8, C
     if let (Some(folder), Some((moment, drawn))) = (&args.pictures, worst) {
         pictures(&world, moment, &drawn, folder, streams)?;
     }
-    Ok(if gate.held() { EXIT_HELD } else { EXIT_FAILED })
+    Ok(exit_of(gate.ruling()))
 }
 
 /// Tells and reads every frame, and has the gate look at it.
@@ -172,10 +131,18 @@ fn gate(
     mut process: Option<&mut Process>,
     bar: &indicatif::ProgressBar,
 ) -> Result<(Trace, Gate, Worst), CliError> {
-    if let Some(process) = &mut process {
-        process.tell(&header_line(world))?;
+    let hang = || Cause::Hang(args.scene_args.frame_limit.frame_limit);
+    if let Some(process) = &process {
+        process.tell(header_line(world));
     }
-    let culler = drawn.header()?;
+    let culler = match drawn.header() {
+        Ok(culler) => culler,
+        // It is named by its command, and ends in frame 0.
+        Err(_) if process.as_ref().is_some_and(|process| process.is_late()) => {
+            args.pipe.clone().unwrap_or_default()
+        }
+        Err(error) => return Err(explained(error, process)),
+    };
     let info = LaneInfo {
         culler,
         oracle: "told",
@@ -185,24 +152,53 @@ fn gate(
     };
     let parts = world.partition.part_count();
     let mut watch = Watch { gate: Gate::forgiving(args.scene_args.late), worst: None };
-    let mut says = |state: &FrameState| -> Result<Vec<PartId>, CliError> {
+    let mut says = |state: &FrameState| -> Result<Result<Vec<PartId>, Cause>, CliError> {
         if interrupted() {
             return Err(RunError::Interrupted.into());
         }
-        if let Some(process) = &mut process {
-            process.tell(&frame_line(world, state))?;
+        if let Some(process) = &process {
+            if process.is_late() {
+                return Ok(Err(hang()));
+            }
+            process.tell(frame_line(world, state));
+            process.waits();
         }
-        let said = drawn.at(state.moment, parts)?;
+        let said = match drawn.at(state.moment, parts) {
+            Ok(said) => said,
+            Err(_) if process.as_ref().is_some_and(|process| process.is_late()) => {
+                return Ok(Err(hang()));
+            }
+            Err(error) => return Err(explained(error, process.as_deref_mut())),
+        };
         bar.inc(1);
-        Ok(said)
+        Ok(Ok(said))
     };
-    let trace = told(world, world.scene.frames, &info, &mut says, &mut watch)?;
-    if let Some(process) = process {
-        // It sees that nothing more comes, and has its last word.
-        process.tell = None;
+    let mut trace = told(world, world.scene.frames, &info, &mut says, &mut watch)?;
+    if trace.stop.is_some() {
+        return Ok((trace, watch.gate, watch.worst));
     }
-    drawn.end()?;
+    if let Some(process) = &mut process {
+        // It has its last word.
+        process.end();
+    }
+    let ended = drawn.end();
+    if ended.is_err() && process.as_ref().is_some_and(|process| process.is_late()) {
+        let moment = trace.frames.last().map(|frame| frame.moment);
+        let stop = Stop { moment, again: false, cause: hang() };
+        watch.stopped(&stop);
+        trace.stop = Some(stop);
+    } else {
+        ended?;
+    }
     Ok((trace, watch.gate, watch.worst))
+}
+
+/// The error, or that the process ended before its time, if it did.
+fn explained(error: ForeignError, process: Option<&mut Process>) -> CliError {
+    match process {
+        Some(process) => process.explained(error),
+        None => error.into(),
+    }
 }
 
 fn replay(args: &JudgeArgs, world: &World) -> String {
@@ -211,11 +207,9 @@ fn replay(args: &JudgeArgs, world: &World) -> String {
         (None, pipe) => format!("--pipe {}", quoted(pipe.as_deref().unwrap_or_default())),
     };
     format!(
-        "plainsight judge --scene {} --seed {} --frames {} {from}{}",
+        "plainsight judge --scene {} {from}{}",
         quoted(&args.scene),
-        world.scene.seed,
-        world.scene.frames,
-        args.scene_args.replay_flags()
+        args.scene_args.replay_flags(&world.scene)
     )
 }
 
@@ -235,32 +229,13 @@ fn tell(
     }
     let failures = failure_lines(gate, trace);
     if !failures.is_empty() {
-        writeln!(streams.talk, "FAILED: {}", trace.lane.culler)?;
+        writeln!(streams.talk, "{}", heading(gate, &trace.lane.culler, trace.lane.oracle))?;
         failures.iter().try_for_each(|line| writeln!(streams.talk, "  {line}"))?;
     }
     if let Some(file) = junit_file {
-        file.finish(junit(&[junit_case(&row, failures)]).as_bytes())?;
+        file.finish(junit(&[junit_case(&row, gate.ruling(), failures)]).as_bytes())?;
     }
     Ok(())
-}
-
-/// What the gate says of a lane, the line that replays it last; nothing where it held.
-pub(super) fn failure_lines(gate: &Gate, trace: &Trace) -> Vec<String> {
-    let mut lines = gate.failures();
-    if !lines.is_empty() {
-        lines.push(format!("replay: {}", trace.lane.replay));
-    }
-    lines
-}
-
-/// The lane of a row.
-pub(super) fn junit_case(row: &Row, failures: Vec<String>) -> JunitCase {
-    JunitCase {
-        scene: row.scene.clone(),
-        name: format!("{}@{}", row.culler, row.oracle),
-        seconds: row.wall_ms / 1000.0,
-        failures,
-    }
 }
 
 fn pictures(

@@ -10,13 +10,19 @@ mod export;
 mod faults;
 mod judge;
 mod list;
+mod oracles;
 mod picture;
+mod pipe;
+mod plan;
 mod progress;
+mod repeat;
 mod replay;
 mod report;
 mod run;
 mod stress;
+mod tell;
 mod thesis;
+mod watchdog;
 mod why;
 
 use std::ffi::OsString;
@@ -28,16 +34,16 @@ use clap::Parser;
 use crate::cull::CullerKind;
 use crate::oracle::OracleError;
 use crate::part::CacheError;
-use crate::run::RunError;
+use crate::run::{RunError, caught};
 use crate::scene::SceneError;
 
 /// Everything held.
 pub const EXIT_HELD: u8 = 0;
-/// A check failed.
+/// A check failed, or something panicked.
 pub const EXIT_FAILED: u8 = 1;
 /// Bad usage or input.
 pub const EXIT_USAGE: u8 = 2;
-/// A device was lost, or missing where one was required.
+/// A device was lost, did not repeat, or was missing where one was required.
 pub const EXIT_DEVICE: u8 = 3;
 /// Stopped by the user, as shells count it: 128 + SIGINT.
 pub const EXIT_INTERRUPTED: u8 = 130;
@@ -65,6 +71,8 @@ enum CliError {
     Cache(#[from] CacheError),
     #[error("{path}: cannot write: {source}; choose another --out")]
     Write { path: String, source: std::io::Error },
+    #[error("panic: {place}: {said}")]
+    Panicked { place: String, said: String },
     #[error("writing the results: {0}")]
     Stream(#[from] std::io::Error),
 }
@@ -80,6 +88,7 @@ impl CliError {
         match self {
             Self::Run(RunError::Interrupted) => EXIT_INTERRUPTED,
             Self::Run(RunError::Oracle(_)) => EXIT_DEVICE,
+            Self::Panicked { .. } => EXIT_FAILED,
             // A reader that has had enough (`| head`) is no error of ours.
             Self::Stream(error) if error.kind() == std::io::ErrorKind::BrokenPipe => EXIT_HELD,
             _ => EXIT_USAGE,
@@ -94,7 +103,8 @@ pub fn main(
     cullers: &[CullerKind],
     mut streams: Streams<'_>,
 ) -> u8 {
-    let cli = match args::Cli::try_parse_from(args) {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let cli = match args::Cli::try_parse_from(&args) {
         Ok(cli) => cli,
         Err(error) => {
             let wanted = !error.use_stderr();
@@ -104,7 +114,9 @@ pub fn main(
             return if wanted { EXIT_HELD } else { EXIT_USAGE };
         }
     };
-    let done = match cli.verb.unwrap_or_default() {
+    let verb = cli.verb.unwrap_or_default();
+    // What a run does not make a failure of its lane: a panic anywhere else.
+    let done = caught(|| match verb {
         args::Verb::Run(args) => run::run(&args, cullers, &mut streams),
         args::Verb::Replay(args) => replay::replay(&args, cullers, &mut streams),
         args::Verb::Picture(args) => picture::picture(&args, cullers, &mut streams),
@@ -120,7 +132,12 @@ pub fn main(
         args::Verb::Report(args) => report::report(&args, cullers, &mut streams),
         args::Verb::Tune(args) => thesis::tune_verb(&args, &mut streams),
         args::Verb::List => list::list(cullers, &mut streams),
-    };
+    });
+    let done = done.unwrap_or_else(|said| {
+        let words = args.iter().map(|word| args::quoted(&word.to_string_lossy()));
+        let line = words.skip(1).fold("plainsight".to_owned(), |line, word| line + " " + &word);
+        Err(CliError::Panicked { place: format!("replay: {line}"), said })
+    });
     done.unwrap_or_else(|error| {
         if !matches!(&error, CliError::Stream(e) if e.kind() == std::io::ErrorKind::BrokenPipe) {
             let _ = writeln!(streams.talk, "plainsight: {error}");

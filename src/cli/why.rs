@@ -8,6 +8,7 @@ use serde_json::json;
 use super::args::SceneArgs;
 use super::picture::{moment_of, named_after};
 use super::progress::progress_bar;
+use super::repeat::RepeatArgs;
 use super::run::{catch_interrupt, interrupted, one_lane};
 use super::{CliError, EXIT_HELD, OutFile, Streams};
 use crate::cull::CullerKind;
@@ -67,7 +68,7 @@ pub(super) fn why(
 ) -> Result<u8, CliError> {
     let scene_args = args.scene_args.clone();
     let lane = (args.scene.as_str(), &args.culler, &args.oracle);
-    let (plan, named) = one_lane(lane, &scene_args, cullers, streams)?;
+    let (plan, named) = one_lane(lane, (&scene_args, RepeatArgs::default()), cullers, streams)?;
     catch_interrupt();
     let bar = progress_bar();
     let world = named.world(&scene_args, plan.cache.as_ref(), &bar, streams);

@@ -1,7 +1,20 @@
-//! JUnit XML, which CI systems read: a suite a scene, a case a lane, a failure where the gate says so.
+//! JUnit XML, which CI systems read: a suite a scene, a case a lane, a failure where the gate says so, an
+//! error where the device is at fault.
 
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event};
 use quick_xml::writer::Writer;
+
+/// How a case ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum JunitEnd {
+    /// Everything held.
+    #[default]
+    Held,
+    /// What was tested failed.
+    Failure,
+    /// The test could not be trusted or not be ended.
+    Error,
+}
 
 /// One lane.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,6 +25,8 @@ pub struct JunitCase {
     pub name: String,
     /// Wall time of its frames, seconds.
     pub seconds: f64,
+    /// How it ended.
+    pub end: JunitEnd,
     /// What the gate says, a line each, the replay line last; none where it held.
     pub failures: Vec<String>,
 }
@@ -30,13 +45,17 @@ pub fn junit(cases: &[JunitCase]) -> String {
     let mut write = |event: Event<'_>| writer.write_event(event).expect("memory takes it");
     write(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)));
     let counts = |cases: &[JunitCase]| {
-        let failed = cases.iter().filter(|case| !case.failures.is_empty()).count();
+        let ended = |end| cases.iter().filter(|case| case.end == end).count().to_string();
         let seconds: f64 = cases.iter().map(|case| case.seconds).sum();
-        (cases.len().to_string(), failed.to_string(), format!("{seconds:.3}"))
+        [
+            ("tests", cases.len().to_string()),
+            ("failures", ended(JunitEnd::Failure)),
+            ("errors", ended(JunitEnd::Error)),
+            ("time", format!("{seconds:.3}")),
+        ]
     };
     let open = |element: &'static str, name: &str, cases: &[JunitCase]| {
-        let (tests, failures, time) = counts(cases);
-        let attributes = [("tests", tests), ("failures", failures), ("time", time)];
+        let attributes = counts(cases);
         let mut start = BytesStart::new(element);
         start.push_attribute(("name", clean(name).as_str()));
         for (key, value) in &attributes {
@@ -52,16 +71,21 @@ pub fn junit(cases: &[JunitCase]) -> String {
             start.push_attribute(("classname", clean(&case.scene).as_str()));
             start.push_attribute(("name", clean(&case.name).as_str()));
             start.push_attribute(("time", format!("{:.3}", case.seconds).as_str()));
-            let Some(first) = case.failures.first() else {
-                write(Event::Empty(start));
-                continue;
+            let element = match case.end {
+                JunitEnd::Held => {
+                    write(Event::Empty(start));
+                    continue;
+                }
+                JunitEnd::Failure => "failure",
+                JunitEnd::Error => "error",
             };
             write(Event::Start(start));
-            let mut failure = BytesStart::new("failure");
-            failure.push_attribute(("message", clean(first).as_str()));
-            write(Event::Start(failure));
+            let mut end = BytesStart::new(element);
+            let first = case.failures.first().map_or("", String::as_str);
+            end.push_attribute(("message", clean(first).as_str()));
+            write(Event::Start(end));
             write(Event::Text(BytesText::new(&clean(&case.failures.join("\n")))));
-            write(Event::End(BytesEnd::new("failure")));
+            write(Event::End(BytesEnd::new(element)));
             write(Event::End(BytesEnd::new("testcase")));
         }
         write(Event::End(BytesEnd::new("testsuite")));
@@ -83,13 +107,18 @@ mod tests {
     #[test]
     fn whatever_stands_in_it_it_reads_back() {
         let nasty = "a <b> & \"c\" 'd' \u{1} ü\n]]>";
-        let case = |scene: &str, failures: &[&str]| JunitCase {
+        let case = |scene: &str, end, failures: &[&str]| JunitCase {
             scene: scene.to_owned(),
             name: format!("full@sim {nasty}"),
             seconds: 0.5,
+            end,
             failures: failures.iter().map(|&line| line.to_owned()).collect(),
         };
-        let cases = [case("one", &[]), case("one", &[nasty, "replay: x"]), case("two", &[])];
+        let cases = [
+            case("one", JunitEnd::Held, &[]),
+            case("one", JunitEnd::Failure, &[nasty, "replay: x"]),
+            case("two", JunitEnd::Error, &["lost"]),
+        ];
         let text = junit(&cases);
         let mut reader = Reader::from_str(&text);
         let (mut names, mut texts, mut unescaped) = (Vec::new(), Vec::new(), String::new());
@@ -115,12 +144,23 @@ mod tests {
                 _ => {}
             }
         }
-        let expected =
-            ["testsuites", "testsuite", "testcase", "testcase", "failure", "testsuite", "testcase"];
+        let expected = [
+            "testsuites",
+            "testsuite",
+            "testcase",
+            "testcase",
+            "failure",
+            "testsuite",
+            "testcase",
+            "error",
+        ];
         assert_eq!(names, expected);
         let shown = nasty.replace('\u{1}', "\u{fffd}");
-        assert_eq!(texts, [shown]);
+        assert_eq!(texts, [shown.as_str(), "lost"]);
         assert!(unescaped.contains("replay: x"), "{unescaped}");
-        assert!(text.contains("name=\"one\" tests=\"2\" failures=\"1\" time=\"1.000\""), "{text}");
+        assert!(
+            text.contains("name=\"one\" tests=\"2\" failures=\"1\" errors=\"0\" time=\"1.000\""),
+            "{text}"
+        );
     }
 }

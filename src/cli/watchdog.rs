@@ -1,0 +1,173 @@
+//! A watchdog beside a run: a culler or device that does not come back from a frame cannot be stopped, as
+//! threads cannot. So a thread looks at the heartbeats of the lanes, and where one is within a frame for
+//! longer than the limit it says which, has the verb keep what it can, and ends the process as failed.
+
+use std::io::Write;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use clap::Args;
+
+use super::{CliError, EXIT_FAILED, OutFile};
+use crate::check::Gate;
+use crate::run::{Beat, Cause, Observer, Stop, oldest_beat};
+
+/// Seconds that a frame of a lane may take where nothing is said. A frame of the plant at full size takes a few
+/// seconds on a software device on two cores; this is far beyond, and still short of a CI system's patience.
+const DEFAULT_SECONDS: f64 = 120.0;
+/// The watchdog looks so often.
+const LOOKS_EVERY: Duration = Duration::from_millis(100);
+
+/// How long a frame may take.
+#[derive(Args, Clone, Copy, Debug, PartialEq)]
+pub(super) struct FrameLimit {
+    /// Seconds that one frame of one culler may take before the run is ended as failed; 0 for any time.
+    #[arg(long, value_name = "SECONDS", default_value_t = DEFAULT_SECONDS, value_parser = seconds)]
+    pub(super) frame_limit: f64,
+}
+
+impl Default for FrameLimit {
+    fn default() -> Self {
+        Self { frame_limit: DEFAULT_SECONDS }
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|&s| Duration::try_from_secs_f64(s).is_ok());
+    seconds.ok_or_else(|| "write a number of seconds, or 0 for no limit".to_owned())
+}
+
+impl FrameLimit {
+    /// As a time; `None` for no limit.
+    pub(super) fn time(self) -> Option<Duration> {
+        Some(Duration::from_secs_f64(self.frame_limit)).filter(|limit| !limit.is_zero())
+    }
+
+    /// The flag that leads here again, with a space before it; nothing for the default.
+    pub(super) fn replay_flags(self) -> String {
+        let usual = self == Self::default();
+        if usual { String::new() } else { format!(" --frame-limit {}", self.frame_limit) }
+    }
+}
+
+/// A lane that does not come back.
+pub(super) struct Hung {
+    pub(super) scene: String,
+    pub(super) seed: u64,
+    pub(super) culler: String,
+    pub(super) oracle: &'static str,
+    pub(super) seconds: f64,
+    /// What the gate says of it, a line each.
+    pub(super) failures: Vec<String>,
+    pub(super) replay: String,
+}
+
+impl Hung {
+    fn of(beat: &Beat, limit: FrameLimit) -> Self {
+        // The words are the gate's own.
+        let mut gate = Gate::default();
+        let cause = Cause::Hang(limit.frame_limit);
+        gate.stopped(&Stop { moment: beat.moment, again: false, cause });
+        let (scene, seed) = (*beat.scene).clone();
+        Self {
+            scene,
+            seed,
+            culler: beat.lane.culler.clone(),
+            oracle: beat.lane.oracle,
+            seconds: beat.age().as_secs_f64(),
+            failures: gate.failures(),
+            replay: beat.lane.replay.clone(),
+        }
+    }
+
+    /// The failures and, where it is known, the line that replays them.
+    pub(super) fn lines(&self) -> Vec<String> {
+        let replay = Some(&self.replay).filter(|replay| !replay.is_empty());
+        let replay = replay.map(|replay| format!("replay: {replay}"));
+        self.failures.iter().cloned().chain(replay).collect()
+    }
+}
+
+/// Ends its thread when dropped.
+pub(super) struct Watchdog {
+    ends: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Watchdog {
+    /// Watches every lane of this process. `keep` is called once, before the process ends, and may say
+    /// another line that replays it.
+    pub(super) fn start(
+        limit: &FrameLimit,
+        mut keep: impl FnMut(&mut Hung) + Send + 'static,
+    ) -> Self {
+        let limit = *limit;
+        let Some(time) = limit.time() else { return Self { ends: None, thread: None } };
+        let (ends, end) = channel::<()>();
+        let watch = move || {
+            while end.recv_timeout(LOOKS_EVERY) == Err(RecvTimeoutError::Timeout) {
+                if let Some(beat) = oldest_beat().filter(|beat| beat.age() > time) {
+                    let mut hung = Hung::of(&beat, limit);
+                    keep(&mut hung);
+                    tell(&hung);
+                    std::process::exit(i32::from(EXIT_FAILED));
+                }
+            }
+        };
+        Self { ends: Some(ends), thread: Some(std::thread::spawn(watch)) }
+    }
+}
+
+/// Says it on the process's own standard error: the streams of the verb are in the thread that hangs.
+fn tell(hung: &Hung) {
+    let mut text = format!(
+        "FAILED: {} on {} in {}, seed {}\n",
+        hung.culler, hung.oracle, hung.scene, hung.seed
+    );
+    for line in hung.lines() {
+        text += &format!("  {line}\n");
+    }
+    // Nothing can be done where even this cannot be written.
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
+impl Drop for Watchdog {
+    fn drop(&mut self) {
+        drop(self.ends.take());
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// A file of lines that a verb writes, and that its watchdog ends where the verb hangs.
+#[derive(Clone)]
+pub(super) struct SharedFile(Arc<Mutex<Option<OutFile>>>);
+
+impl SharedFile {
+    pub(super) fn new(file: Option<OutFile>) -> Self {
+        Self(Arc::new(Mutex::new(file)))
+    }
+
+    /// It is whole at every moment, also after a panic elsewhere.
+    fn locked(&self) -> MutexGuard<'_, Option<OutFile>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Adds a line, if there is a file.
+    pub(super) fn line(&self, line: &str) -> Result<(), CliError> {
+        self.locked().as_mut().map_or(Ok(()), |file| file.line(line))
+    }
+
+    /// Adds the rest and ends the file, if there is one.
+    pub(super) fn finish(&self, rest: &[u8]) -> Result<(), CliError> {
+        self.locked().take().map_or(Ok(()), |file| file.finish(rest))
+    }
+
+    /// Takes away what was begun.
+    pub(super) fn drop(&self) {
+        drop(self.locked().take());
+    }
+}
