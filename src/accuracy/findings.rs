@@ -190,6 +190,7 @@ mod tests {
             cut_pixels: 0,
             wall_ns: [1, 2, 3],
             sound: wrong_pixels == 0,
+            verdict: "held".to_owned(),
             failures: Vec::new(),
         }
     }

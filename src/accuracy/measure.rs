@@ -10,7 +10,8 @@ use crate::cull::{CullerSetup, PerView};
 use crate::oracle::{Approximate, CostModel, Oracle, Schedule, Simulated};
 use crate::part::PartitionKnobs;
 use crate::run::{
-    FrameRecord, FrameTrace, Lane, LaneInfo, Observer, Repeat, RunError, Trace, World, render, run,
+    FrameRecord, Lane, LaneInfo, Observer, Repeat, Repetition, RunError, Stop, Trace, World,
+    render, run,
 };
 use crate::scene::Scene;
 
@@ -59,7 +60,10 @@ pub struct Point {
     pub wall_ns: [u64; 3],
     /// Whether nothing may be lost.
     pub sound: bool,
-    /// What the gate said where something was.
+    /// The gate's word; see [`Gate::word`].
+    pub verdict: String,
+    /// What the gate said, a line each: of what was lost where nothing may be, and of what must not happen in
+    /// any setting.
     pub failures: Vec<String>,
 }
 
@@ -115,8 +119,12 @@ impl Observer for Meter {
         self.depth_error = self.depth_error.max(differs.depth_error);
     }
 
-    fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
-        self.gate.repeated(first, again);
+    fn repeated(&mut self, repetition: &Repetition<'_>) {
+        self.gate.repeated(repetition);
+    }
+
+    fn stopped(&mut self, stop: &Stop) {
+        self.gate.stopped(stop);
     }
 }
 
@@ -251,6 +259,9 @@ fn point(world: &World, setting: &Setting, meter: Meter, trace: &Trace, cut_pixe
         cut_pixels,
         wall_ns: [least, trace.sum(|frame| frame.wall_ns), most],
         sound: meter.sound,
-        failures: if meter.sound { meter.gate.failures() } else { Vec::new() },
+        verdict: meter.gate.word(),
+        // Of a setting that may lose something the gate was shown no frame: that it repeats and comes to its
+        // end is asked of every one.
+        failures: meter.gate.failures(),
     }
 }

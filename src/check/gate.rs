@@ -2,13 +2,17 @@
 
 use std::fmt;
 
-use super::{Conservative, CountsCheck, Determinism, DeviceImage, Excess, ImageCheck};
+use super::{
+    Check, Conservative, CountsCheck, Determinism, DeviceImage, Excess, Failure, ImageCheck,
+    Ruling, TruthCheck,
+};
 use crate::cull::{Culler, CullerSetup, PerView, ProxyKind};
 use crate::index::INDEXES;
 use crate::oracle::{CostModel, Oracle, Sim};
 use crate::part::PartitionKnobs;
 use crate::run::{
-    self, FrameRecord, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World,
+    self, Cause, FrameRecord, Lane, LaneInfo, Moment, Observer, Repeat, Repetition, RunError, Stop,
+    Trace, World,
 };
 use crate::scene::Scene;
 
@@ -32,12 +36,21 @@ pub struct Gate {
     pub counts: CountsCheck,
     /// What was drawn in vain.
     pub excess: Excess,
+    /// The truth itself is right.
+    pub truth: TruthCheck,
+    /// Why the lane ended early.
+    stop: Option<Stop>,
     /// Whether parts may be missing for some frames: then pictures may lack them, and are not compared.
     late: bool,
 }
 
 impl Observer for Gate {
     fn frame(&mut self, record: &FrameRecord<'_>) {
+        let picked = self.truth.picks();
+        // Taken back where the naive renderer decides otherwise.
+        let before = (picked || self.truth.doubts()).then(|| self.conservative.clone());
+        let counts = [self.image.differences().len(), self.device_image.differences().len()];
+        let misses = self.conservative.misses().len();
         self.conservative.frame(record);
         if !self.late {
             self.image.frame(record);
@@ -45,10 +58,27 @@ impl Observer for Gate {
         }
         self.counts.frame(record);
         self.excess.frame(record);
+        let failing = misses < self.conservative.misses().len()
+            || counts != [self.image.differences().len(), self.device_image.differences().len()];
+        if (picked || (failing && self.truth.doubts()))
+            && let Some(naive) = self.truth.frame(record, failing)
+            && let Some(before) = before
+        {
+            let record = record.beside(&naive.truth, &naive.drawn);
+            self.conservative = before;
+            self.conservative.frame(&record);
+            if !self.late {
+                self.image.look_again(&record);
+            }
+        }
     }
 
-    fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
-        self.determinism.repeated(first, again);
+    fn repeated(&mut self, repetition: &Repetition<'_>) {
+        self.determinism.repeated(repetition);
+    }
+
+    fn stopped(&mut self, stop: &Stop) {
+        self.stop = Some(stop.clone());
     }
 }
 
@@ -61,71 +91,126 @@ impl Gate {
         Self { conservative, late: frames > 0, ..Self::default() }
     }
 
-    /// The verdict in a word: `held`, `failed`, or `held late(k)` where parts that show were missing, for k
-    /// frames at most, and that was allowed.
+    /// The same, with the naive renderer drawing a frame now and then; see [`TruthCheck::sampling`].
+    #[must_use]
+    pub fn sampling(self, truth: TruthCheck) -> Self {
+        Self { truth, ..self }
+    }
+
+    /// What the lane comes to.
+    #[must_use]
+    pub fn ruling(&self) -> Ruling {
+        let rulings = self.findings().into_iter().map(|failure| failure.check.ruling());
+        rulings.max().unwrap_or_default()
+    }
+
+    /// The verdict in a word: that of [`Gate::ruling`], or `held late(k)` where parts that show were missing,
+    /// for k frames at most, and that was allowed.
     #[must_use]
     pub fn word(&self) -> String {
-        match (self.held(), self.conservative.latest()) {
-            (false, _) => "failed".to_owned(),
-            (true, 0) => "held".to_owned(),
-            (true, latest) => format!("held late({latest})"),
+        match (self.ruling(), self.conservative.latest()) {
+            (Ruling::Held, latest) if latest > 0 => format!("held late({latest})"),
+            (ruling, _) => ruling.word().to_owned(),
         }
     }
 
     /// Whether everything held.
     #[must_use]
     pub fn held(&self) -> bool {
-        self.failures().is_empty()
+        self.ruling() == Ruling::Held
     }
 
-    /// When something failed first; the counts' failure has no earlier time than its own frame.
+    /// Whether all that is wrong is the truth.
+    #[must_use]
+    pub fn only_truth_failed(&self) -> bool {
+        let findings = self.findings();
+        !findings.is_empty() && findings.iter().all(|failure| failure.check == Check::Truth)
+    }
+
+    /// When something failed first.
     #[must_use]
     pub fn first_failure(&self) -> Option<Moment> {
-        let misses = self.conservative.misses().iter().map(|miss| miss.moment);
-        let images = self.image.differences().iter().chain(self.device_image.differences());
-        let images = images.map(|difference| difference.moment);
-        let others = [self.determinism.first_difference(), self.counts.overcounted()];
-        misses.chain(images).chain(others.into_iter().flatten()).min()
+        self.findings().into_iter().filter_map(|failure| failure.moment).min()
+    }
+
+    /// The checks that noticed something, each once, in their order.
+    #[must_use]
+    pub fn checks(&self) -> Vec<Check> {
+        let mut checks: Vec<Check> = self.findings().into_iter().map(|f| f.check).collect();
+        checks.sort_unstable();
+        checks.dedup();
+        checks
     }
 
     /// Each failure as a line: frame, part, pixel.
     #[must_use]
     pub fn failures(&self) -> Vec<String> {
-        let mut lines = Vec::new();
-        let misses = self.conservative.misses();
-        for miss in misses.iter().take(NAMED_MISSES) {
-            let [x, y] = miss.first_pixel;
-            lines.push(format!(
-                "set: {} part {} is visible in {} pixels, first at ({x}, {y}), and was not drawn",
-                miss.moment, miss.part.0, miss.pixels
-            ));
+        self.findings().into_iter().map(|failure| failure.line).collect()
+    }
+
+    /// Everything that is wrong. All else that a gate says of failures is taken from here.
+    #[must_use]
+    pub fn findings(&self) -> Vec<Failure> {
+        let mut found = Vec::new();
+        if let Some(wrong) = self.truth.wrong().first() {
+            let [x, y] = wrong.first_pixel;
+            let what = if wrong.of_drawn { " of what was drawn" } else { "" };
+            let said = format!(
+                "the fast renderer and the naive one disagree in {} pixels{what}, first at ({x}, {y}), {}; the naive renderer decides",
+                wrong.pixels, wrong.moment
+            );
+            found.push(Failure::new(Check::Truth, Some(wrong.moment), said));
         }
-        if misses.len() > NAMED_MISSES {
-            lines.push(format!("set: {} more misses", misses.len() - NAMED_MISSES));
+        let misses = self.conservative.misses();
+        found.extend(misses.iter().take(NAMED_MISSES).map(|miss| {
+            let [x, y] = miss.first_pixel;
+            let said = format!(
+                "{} part {} is visible in {} pixels, first at ({x}, {y}), and was not drawn",
+                miss.moment, miss.part.0, miss.pixels
+            );
+            Failure::new(Check::Set, Some(miss.moment), said)
+        }));
+        if let Some(next) = misses.get(NAMED_MISSES) {
+            let said = format!("{} more misses", misses.len() - NAMED_MISSES);
+            found.push(Failure::new(Check::Set, Some(next.moment), said));
         }
         let images = [
-            ("image", self.image.differences()),
-            ("device image", self.device_image.differences()),
+            (Check::Image, self.image.differences()),
+            (Check::DeviceImage, self.device_image.differences()),
         ];
         for (check, differences) in images {
             if let Some(first) = differences.first() {
                 let [x, y] = first.first_pixel;
-                lines.push(format!(
-                    "{check}: {} frames differ, first {} in {} pixels, first at ({x}, {y})",
+                let said = format!(
+                    "{} frames differ, first {} in {} pixels, first at ({x}, {y})",
                     differences.len(),
                     first.moment,
                     first.pixels
-                ));
+                );
+                found.push(Failure::new(check, Some(first.moment), said));
             }
         }
         if let Some(moment) = self.determinism.first_difference() {
             let event = self.determinism.first_event();
-            lines.push(format!("determinism: {moment} left another trace when run again: {event}"));
+            let said = format!("{moment} left another trace when run again: {event}");
+            found.push(Failure::new(Check::Determinism, Some(moment), said));
         }
         if let Some(moment) = self.counts.overcounted() {
-            lines.push(format!("counts: {moment} has more answers than questions"));
+            let said = format!("{moment} has more answers than questions");
+            found.push(Failure::new(Check::Counts, Some(moment), said));
         }
-        lines
+        if let Some((moment, said)) = self.determinism.device() {
+            found.push(Failure::new(Check::Repeatable, Some(moment), said));
+        }
+        if let Some(stop) = &self.stop {
+            let check = match stop.cause {
+                Cause::Panic(_) => Check::Panic,
+                Cause::Hang(_) => Check::Hang,
+                Cause::Oracle(_) => Check::Lost,
+            };
+            found.push(Failure::new(check, stop.moment, stop));
+        }
+        found
     }
 }
 
@@ -158,7 +243,7 @@ impl fmt::Display for Verdict {
 /// index of [`INDEXES`], the first frames twice.
 ///
 /// # Errors
-/// What the oracle said; the simulated device never gives up.
+/// None: nobody interrupts it, and what a culler or the device does is in the verdict.
 pub fn judge(
     scene: Scene,
     make: impl Fn(CullerSetup) -> Box<dyn Culler>,

@@ -6,13 +6,17 @@ mod counts;
 mod determinism;
 mod device_image;
 mod excess;
+mod failure;
 mod gate;
 mod image;
+mod truth;
 
 pub use conservative::{Conservative, Miss};
 pub use counts::CountsCheck;
 pub use determinism::Determinism;
 pub use device_image::DeviceImage;
 pub use excess::Excess;
+pub use failure::{Check, Failure, Ruling};
 pub use gate::{Gate, Verdict, judge};
 pub use image::ImageCheck;
+pub use truth::{Disagreement, TruthCheck};

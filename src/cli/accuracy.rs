@@ -10,20 +10,22 @@ use serde_json::{Value, json};
 use super::args::SceneArgs;
 use super::files::Files;
 use super::progress::{counting_triangles, progress_bar};
-use super::run::{Named, matching, pick_cache, pick_cost};
+use super::run::{Named, exit_of, matching, pick_cache, pick_cost};
 use super::signals::{catch_interrupt, interrupted, stoppable};
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Outputs, Streams};
+use super::watchdog::Watchdog;
+use super::{CliError, EXIT_HELD, OutFile, Outputs, Streams};
 use crate::accuracy::{
     EffectPoint, KNOBS, Point, RendererPoint, Setting, Worlds, effects, findings, measure,
     renderers, settings,
 };
+use crate::check::Ruling;
 use crate::effect::EFFECTS;
 use crate::oracle::CostModel;
 use crate::part::Cache;
 use crate::report::{
     accuracy_chart, accuracy_table, effect_table, picture_png, renderer_table, wrapped,
 };
-use crate::run::{RunError, World};
+use crate::run::{Canary, RunError, World};
 use crate::scene::{Scene, Viewport};
 
 /// Of the JSON lines.
@@ -151,12 +153,14 @@ pub(super) fn accuracy(
     };
     bar.set_length(scenes.iter().map(of_scene).sum());
     let mut words = format!("# What accuracy costs in time\n\nCost model: {}.\n", cost.name);
-    let (mut failed, mut done) = (false, 0);
+    let (mut ruling, mut done) = (Ruling::Held, 0);
+    let watchdog = Watchdog::start(&args.scene_args.frame_limit, |_| {});
     let ended = scenes.iter().zip(charts).try_for_each(|(scene, [svg, png])| {
+        let (cost, settings, cache) = (&cost, &settings, cache.as_ref());
         let plan =
-            Plan { cost: &cost, settings: &settings, cache: cache.as_ref(), rounds: args.rounds };
+            Plan { cost, settings, cache, rounds: args.rounds, canary: args.scene_args.canary };
         let figures = stoppable(|| plan.measure(scene, &bar, streams))??;
-        failed |= bar.suspend(|| tell(args, scene, &figures, &mut words, streams))?;
+        ruling = ruling.max(bar.suspend(|| tell(args, scene, &figures, &mut words, streams))?);
         let Figures { points, renderers, effects } = &figures;
         points.iter().try_for_each(|point| lines.line(&line("accuracy", point)))?;
         renderers.iter().try_for_each(|point| lines.line(&line("accuracy renderer", point)))?;
@@ -167,6 +171,7 @@ pub(super) fn accuracy(
         done += 1;
         Ok::<(), CliError>(())
     });
+    drop(watchdog);
     bar.finish_and_clear();
     if ended.is_ok() || done > 0 {
         lines.finish(&[])?;
@@ -174,7 +179,12 @@ pub(super) fn accuracy(
     }
     ended?;
     let to = if args.json { &mut streams.talk } else { &mut streams.out };
-    let word = if failed { "FAILED: a setting that takes nothing lost something" } else { "held" };
+    let word = match ruling {
+        Ruling::Failed => {
+            "FAILED: a setting that takes nothing lost something, or some other broke"
+        }
+        other => other.word(),
+    };
     let seconds = bar.elapsed().as_secs_f64();
     writeln!(
         to,
@@ -183,7 +193,7 @@ pub(super) fn accuracy(
         scenes.len(),
         out.path().display()
     )?;
-    Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
+    Ok(exit_of(ruling))
 }
 
 /// What stays the same from scene to scene.
@@ -192,6 +202,7 @@ struct Plan<'a> {
     settings: &'a [Setting],
     cache: Option<&'a Cache>,
     rounds: u32,
+    canary: Option<Canary>,
 }
 
 impl Plan<'_> {
@@ -215,7 +226,7 @@ impl Plan<'_> {
             });
             warnings.borrow_mut().extend(world.made.warnings.iter().cloned());
             bar.set_message(name);
-            world
+            world.with_canary(self.canary)
         };
         let worlds = Worlds::new(scene.clone(), &make);
         let points = measure(&worlds, self.cost, self.rounds, self.settings, &mut tick)?;
@@ -231,14 +242,14 @@ impl Plan<'_> {
     }
 }
 
-/// The tables of a scene and its findings; whether a sound setting lost anything.
+/// The tables of a scene and its findings; what the worst of its settings came to.
 fn tell(
     args: &AccuracyArgs,
     scene: &Scene,
     Figures { points, renderers, effects }: &Figures,
     words: &mut String,
     streams: &mut Streams<'_>,
-) -> Result<bool, CliError> {
+) -> Result<Ruling, CliError> {
     let Viewport { width, height } = scene.viewport;
     let title = format!(
         "{}, seed {}: {} objects, {} triangles, {} frames of {width}x{height}",
@@ -269,12 +280,12 @@ fn tell(
             writeln!(streams.out, "{}\n", wrapped(finding, width))?;
         }
     }
-    let mut failed = false;
+    let mut ruling = Ruling::Held;
     for point in points.iter().filter(|point| !point.failures.is_empty()) {
-        failed = true;
+        ruling = ruling.max(Ruling::of(&point.verdict).unwrap_or(Ruling::Failed));
         for failure in &point.failures {
             writeln!(streams.talk, "{} {} {}: {failure}", scene.name, point.knob, point.value)?;
         }
     }
-    Ok(failed)
+    Ok(ruling)
 }

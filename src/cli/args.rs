@@ -10,14 +10,16 @@ use super::export::ExportArgs;
 use super::faults::FaultsArgs;
 use super::files::Files;
 use super::judge::JudgeArgs;
+use super::repeat::RepeatArgs;
 use super::report::ReportArgs;
 use super::stress::StressArgs;
 use super::thesis::TuneArgs;
+use super::watchdog::FrameLimit;
 use super::why::WhyArgs;
 use crate::cull::ProxyKind;
 use crate::oracle::{Latency, MIB, MemoryKnobs, Misbehaviour, Schedule};
 use crate::part::{Crossing, PartitionKnobs};
-use crate::run::CalibrationKnobs;
+use crate::run::{CalibrationKnobs, Canary};
 use crate::scene::generate::{CameraMode, Knobs};
 use crate::scene::{DepthOrder, Scene, Viewport};
 
@@ -28,8 +30,8 @@ use crate::scene::{DepthOrder, Scene, Viewport};
     version,
     about,
     after_help = "Exit codes: 0 all held, 1 a check \
-failed, 2 bad usage or input, 3 a device was lost or missing where one was required; 130, 143 and 129 stopped \
-by Ctrl-C, SIGTERM and SIGHUP, what was finished is written; 141 the reader of the results went away. \
+failed, 2 bad usage or input, 3 a device was lost, did not repeat, or was missing where one was required; 130, 143 \
+and 129 stopped by Ctrl-C, SIGTERM and SIGHUP, what was finished is written; 141 the reader of the results went away. \
 `-` as an output file is standard output."
 )]
 pub(super) struct Cli {
@@ -133,8 +135,8 @@ pub(super) struct SceneArgs {
     /// Share of hidden answers that the simulated device tells as visible, from 0 to 1.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
     pub(super) doubt: f64,
-    /// What the simulated device does wrong, once: lost=N or hangs=N (a submit, counted from 0 over the run),
-    /// unwritten=N (a question).
+    /// What the simulated device does wrong, once: lost=N or hangs=N (a submit, counted from 0 over the run and
+    /// its repetitions), unwritten=N or flips=N (a question).
     #[arg(long, value_name = "WHAT=N")]
     pub(super) misbehave: Option<Misbehaviour>,
     /// Frames in a row for which a part that shows may be missing: for policies that trust a stale "hidden".
@@ -162,6 +164,12 @@ pub(super) struct SceneArgs {
     /// Part of the name of the Vulkan adapter to use (default: a CPU adapter such as lavapipe).
     #[arg(long)]
     pub(super) adapter: Option<String>,
+    #[command(flatten)]
+    pub(super) frame_limit: FrameLimit,
+    /// Makes every lane wrong on purpose, to see that the failure arrives: set, image, device-image,
+    /// determinism, counts, truth, panic, unrepeatable, lost, set-then-lost or hang.
+    #[arg(long, value_name = "CHECK")]
+    pub(super) canary: Option<Canary>,
 }
 
 #[derive(Args, Clone)]
@@ -178,6 +186,8 @@ pub(super) struct RunArgs {
     pub(super) oracle: Vec<String>,
     #[command(flatten)]
     pub(super) scene_args: SceneArgs,
+    #[command(flatten)]
+    pub(super) repeat: RepeatArgs,
     /// One JSON object a line on standard output in place of the table.
     #[arg(long)]
     pub(super) json: bool,
@@ -208,9 +218,8 @@ pub(super) struct CompareArgs {
     pub(super) leaves: Vec<u32>,
     #[command(flatten)]
     pub(super) scene_args: SceneArgs,
-    /// How often everything is run, the cullers in turn; wall times are the medians.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
-    pub(super) rounds: u32,
+    #[command(flatten)]
+    pub(super) repeat: RepeatArgs,
     /// One JSON object a lane on standard output in place of the tables.
     #[arg(long)]
     pub(super) json: bool,
@@ -242,6 +251,8 @@ pub(super) struct ReplayArgs {
     pub(super) oracle: String,
     #[command(flatten)]
     pub(super) scene_args: SceneArgs,
+    #[command(flatten)]
+    pub(super) repeat: RepeatArgs,
     /// The trace hash that must come out.
     #[arg(long, value_name = "HASH")]
     pub(super) expect: Option<String>,
@@ -489,42 +500,51 @@ impl SceneArgs {
         }
     }
 
-    /// The flags that lead here again, each preceded by a space; defaults are left out, and what no
-    /// result depends on.
-    pub(super) fn replay_flags(&self) -> String {
-        let mut flags = String::from(if self.full_size { " --full-size" } else { "" });
+    /// The flags that lead to this scene again, each with a space before it; defaults are left out but for
+    /// the seed and the frames. Those that no result depends on are told as well: where a failure shows that
+    /// one does depend on them, it must be there.
+    pub(super) fn replay_flags(&self, scene: &Scene) -> String {
+        let mut flags = format!(" --seed {} --frames {}", scene.seed, scene.frames);
+        let mut switch = |name: &str, on: bool| {
+            if on {
+                flags += &format!(" --{name}");
+            }
+        };
+        switch("full-size", self.full_size);
+        switch("every-triangle", self.every_triangle);
         let mut add = |name: &str, value: Option<String>| {
             if let Some(value) = value {
                 flags += &format!(" --{name} {}", quoted(&value));
             }
         };
+        let path = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
         add("scale", self.scale.map(|s| s.to_string()));
         add("viewport", self.viewport.map(|v| format!("{}x{}", v.width, v.height)));
-        let depth = |d: DepthArg| if d == DepthArg::Forward { "forward" } else { "reversed" };
-        add("depth", self.depth.map(|d| depth(d).to_owned()));
-        add("mesh", self.mesh.as_ref().map(|path| path.display().to_string()));
-        let camera = |c: CameraArg| if c == CameraArg::Inside { "inside" } else { "orbit" };
-        add("camera", self.camera.map(|c| camera(c).to_owned()));
+        add("depth", self.depth.map(word));
+        add("mesh", path(&self.mesh));
+        add("camera", self.camera.map(word));
         add("leaf", self.leaf.map(|leaf| leaf.to_string()));
-        add("parts", (self.parts == PartsArg::Whole).then(|| "whole".to_owned()));
+        add("parts", (self.parts != PartsArg::Split).then(|| word(self.parts)));
         add("index", (self.index != "two-level-bsp").then(|| self.index.clone()));
-        add(
-            "proxy",
-            match self.proxy {
-                ProxyArg::Rectangle => None,
-                ProxyArg::Hull => Some("hull".to_owned()),
-                ProxyArg::Box => Some("box".to_owned()),
-            },
-        );
-        let latency = self.schedule().latency;
-        add("latency", (latency != Latency::Even).then(|| latency.name().to_owned()));
+        add("proxy", (self.proxy != ProxyArg::Rectangle).then(|| word(self.proxy)));
+        add("cost", (self.cost != "lavapipe").then(|| self.cost.clone()));
+        add("latency", (self.latency != LatencyArg::Even).then(|| word(self.latency)));
         add("doubt", (self.doubt > 0.0).then(|| self.doubt.to_string()));
+        add("misbehave", self.misbehave.map(|what| what.to_string()));
+        add("late", (self.late > 0).then(|| self.late.to_string()));
         add("memory", self.memory.map(|mib| mib.to_string()));
         add("prefetch", self.prefetch.map(|mib| mib.to_string()));
-        add("cost", (self.cost != "lavapipe").then(|| self.cost.clone()));
+        add("cache", path(&self.cache));
+        add("simd", self.simd.map(|level| level.to_string()));
         add("adapter", self.adapter.clone());
-        flags
+        add("canary", self.canary.map(|canary| canary.to_string()));
+        flags + &self.frame_limit.replay_flags()
     }
+}
+
+/// The word of a value that a flag chooses from.
+fn word(value: impl ValueEnum) -> String {
+    value.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned())
 }
 
 /// A word as a POSIX shell takes it back.
@@ -534,5 +554,96 @@ pub(super) fn quoted(word: &str) -> String {
         word.to_owned()
     } else {
         format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Command;
+
+    use super::*;
+    use crate::scene::generate::build;
+
+    /// A value of each flag that is not its default.
+    const VALUES: [(&str, &str); 24] = [
+        ("seed", "9"),
+        ("frames", "5"),
+        ("scale", "0.25"),
+        ("viewport", "97x61"),
+        ("depth", "reversed"),
+        ("mesh", "a model.obj"),
+        ("camera", "inside"),
+        ("leaf", "77"),
+        ("parts", "whole"),
+        ("index", "list"),
+        ("proxy", "hull"),
+        ("cost", "h100"),
+        ("latency", "spiky"),
+        ("doubt", "0.5"),
+        ("misbehave", "flips=7"),
+        ("late", "2"),
+        ("memory", "64"),
+        ("prefetch", "3"),
+        ("cache", "trees"),
+        ("simd", "scalar"),
+        ("adapter", "llvm pipe"),
+        ("frame-limit", "2.5"),
+        ("canary", "panic"),
+        ("rounds", "3"),
+    ];
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        scene: SceneArgs,
+        #[command(flatten)]
+        repeat: RepeatArgs,
+    }
+
+    fn line(words: &[String]) -> Line {
+        let words = ["plainsight".to_owned()].into_iter().chain(words.iter().cloned());
+        Line::try_parse_from(words).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn flags(of: &Line) -> String {
+        let knobs = Knobs { seed: of.scene.seed, frames: of.scene.frames, ..Knobs::default() };
+        of.scene.replay_flags(&build("soup", &knobs).unwrap()) + &of.repeat.replay_flags()
+    }
+
+    /// A line as a shell splits it.
+    fn words(line: &str) -> Vec<String> {
+        let pieces = line.split('\'').enumerate();
+        let words = pieces.flat_map(|(place, piece)| match place % 2 {
+            1 => vec![piece.to_owned()],
+            _ => piece.split_whitespace().map(str::to_owned).collect(),
+        });
+        words.collect()
+    }
+
+    /// Every flag that there is, by clap's own list, is told by the replay line and read back to the same.
+    #[test]
+    fn replay_lines_carry_every_flag() {
+        let command = RepeatArgs::augment_args(SceneArgs::augment_args(Command::new("plainsight")));
+        for arg in command.get_arguments() {
+            let name = arg.get_long().expect("every flag has a long name");
+            let flag = format!("--{name}");
+            let mut given = vec![flag.clone()];
+            if arg.get_action().takes_values() {
+                let value = VALUES.iter().find(|(flag, _)| *flag == name);
+                let value = value.or(Some(&("repeat", "4")).filter(|_| name == "repeat"));
+                let (_, value) = value.unwrap_or_else(|| panic!("no value is known for {flag}"));
+                given.push((*value).to_owned());
+            }
+            if name == "prefetch" {
+                given.extend(["--memory".to_owned(), "64".to_owned()]);
+            }
+            let told = flags(&line(&given));
+            let said = words(&told);
+            let place = said.iter().position(|word| *word == flag);
+            let place = place.unwrap_or_else(|| panic!("{flag} is lost in{told}"));
+            assert_eq!(said.get(place + 1), given.get(1).or(said.get(place + 1)), "{told}");
+            assert_eq!(flags(&line(&said)), told);
+        }
+        assert_eq!(flags(&line(&[])), " --seed 1 --frames 24");
     }
 }

@@ -5,16 +5,18 @@ use std::path::Path;
 use super::args::{CompareArgs, SceneArgs};
 use super::progress::progress_bar;
 use super::run::{
-    Finished, Named, Oracles, Plan, REPEAT, matching, pick_cache, pick_cost, pick_cullers,
+    Finished, Named, Oracles, Plan, exit_of, loud, matching, pick_cache, pick_cost, pick_cullers,
     pick_index, tell_failures,
 };
 use super::signals::catch_interrupt;
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Outputs, Streams};
+use super::watchdog::Watchdog;
+use super::{CliError, OutFile, Outputs, Streams};
+use crate::check::Ruling;
 use crate::cull::CullerKind;
 use crate::oracle::CostModel;
 use crate::part::Made;
 use crate::report::{Comparison, picture_png, wrapped};
-use crate::run::{FrameState, Moment, Repeat, Trace, World, depth_complexity};
+use crate::run::{FrameState, Moment, Trace, World, depth_complexity};
 
 /// The scenes of the paper.
 const SCENES: [&str; 2] = ["powerplant", "bunnies"];
@@ -110,15 +112,13 @@ pub(super) fn compare(
     let adapter = args.scene_args.adapter.as_deref();
     let oracles =
         Oracles::open(&args.oracle, adapter, streams)?.simulating(&cost, &args.scene_args);
-    let repeat = match args.rounds {
-        1 => REPEAT,
-        rounds => Repeat { frames: u32::MAX, rounds: rounds - 1 },
-    };
     let (cullers, with_bound, args_of) = (chosen, true, &args.scene_args);
+    let repeat = args.repeat;
     let mut plan = Plan { cullers, index, oracles, cost, cache, repeat, with_bound, args: args_of };
     catch_interrupt();
     let bar = progress_bar();
-    let (mut failed, mut done) = (false, 0);
+    let watchdog = Watchdog::start(&args.scene_args.frame_limit, |_| {});
+    let (mut ruling, mut done) = (Ruling::Held, 0);
     let ended = cases.iter().zip(files).try_for_each(|(case, figures)| {
         plan.args = &case.args;
         let finished = plan.run_after(&case.named, &bar, streams, &mut |world, streams| {
@@ -129,19 +129,20 @@ pub(super) fn compare(
             writeln!(to, "{}", wrapped(&line, width))
         })?;
         let to = (figures, &mut csv, args.json);
-        failed |= tell_case(case, &finished, &plan.cost, to, streams, &bar)?;
+        ruling = ruling.max(finished.ruling());
+        tell_case(case, &finished, &plan.cost, to, streams, &bar)?;
         done += 1;
         Ok::<(), CliError>(())
     });
+    drop(watchdog);
     bar.finish_and_clear();
     if ended.is_ok() || done > 0 {
         csv.file.finish(&[])?;
     }
     ended?;
-    let word = if failed { "FAILED" } else { "held" };
     let to = if args.json { &mut streams.talk } else { &mut streams.out };
-    writeln!(to, "verdict: {word}; figures and series in {}", out.path().display())?;
-    Ok(if failed { EXIT_FAILED } else { EXIT_HELD })
+    writeln!(to, "verdict: {}; figures and series in {}", loud(ruling), out.path().display())?;
+    Ok(exit_of(ruling))
 }
 
 /// The series of all cases, one head above them.
@@ -177,7 +178,7 @@ fn about(case: &Case, world: &World) -> String {
     )
 }
 
-/// Tables, failures and figures of one case; whether anything failed.
+/// Tables, failures and figures of one case.
 fn tell_case(
     case: &Case,
     finished: &Finished,
@@ -185,11 +186,9 @@ fn tell_case(
     (figures, csv, json): (Figures<'_>, &mut Csv<'_>, bool),
     streams: &mut Streams<'_>,
     bar: &indicatif::ProgressBar,
-) -> Result<bool, CliError> {
-    let mut failed = false;
-    for (trace, gate) in finished.traces.iter().zip(&finished.gates) {
-        failed |= !gate.held();
-        bar.suspend(|| tell_failures(gate, trace, streams))?;
+) -> Result<(), CliError> {
+    for lane in finished.lanes() {
+        bar.suspend(|| tell_failures(lane, streams))?;
     }
     let mut oracles: Vec<&str> = Vec::new();
     for trace in &finished.traces {
@@ -219,7 +218,7 @@ fn tell_case(
             }
         }
     }
-    Ok(failed)
+    Ok(())
 }
 
 /// How the object trees were come by.

@@ -1,6 +1,7 @@
 //! `faults`: the gate on trial. Every seeded fault must be caught, and nothing said of unbroken cullers.
 
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::Args;
 use rayon::prelude::*;
@@ -8,11 +9,14 @@ use serde_json::json;
 
 use super::files::Files;
 use super::progress::progress_bar;
+use super::run::exit_of;
 use super::signals::{catch_interrupt, interrupted};
-use super::{CliError, EXIT_FAILED, EXIT_HELD, Outputs, Streams};
+use super::watchdog::{FrameLimit, Hung, SharedFile, Watchdog};
+use super::{CliError, Outputs, Streams};
+use crate::check::Ruling;
 use crate::cull::CULLERS;
 use crate::fault::{self, Evidence, Fault, Harm, OTHERS, SOUND, Trial, faults as all_faults};
-use crate::run::World;
+use crate::run::{Canary, World};
 use crate::scene::generate::HARD;
 use crate::stress::Choice;
 
@@ -49,6 +53,11 @@ pub(super) struct FaultsArgs {
     /// Also write the JSON lines to this file; `-` is standard output, and the table goes to standard error.
     #[arg(long, value_name = "FILE|-")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    frame_limit: FrameLimit,
+    /// Makes every unbroken rig wrong on purpose, to see that the false alarm arrives; see `run --canary`.
+    #[arg(long, value_name = "CHECK")]
+    canary: Option<Canary>,
 }
 
 impl FaultsArgs {
@@ -130,6 +139,11 @@ impl Tried {
         .to_string()
     }
 
+    /// What its false alarms come to.
+    fn alarm(&self) -> Ruling {
+        self.runs.iter().map(|(.., evidence)| evidence.alarm).max().unwrap_or_default()
+    }
+
     fn false_alarms(&self) -> Vec<String> {
         let lines = |(scene, seed, evidence): &(String, u64, Evidence)| {
             let line =
@@ -168,7 +182,7 @@ fn try_fault(
     let mut runs = Vec::new();
     for scene in scenes {
         for seed in seeds.clone() {
-            let trial = Trial::new(fault, scene, seed, args.frames)?;
+            let trial = Trial::new(fault, scene, seed, args.frames)?.with_canary(args.canary);
             runs.push((scene.to_owned(), seed, trial.run(fault, tick)?));
         }
     }
@@ -180,6 +194,7 @@ fn try_fault(
 struct SoundRuns {
     frames: u64,
     alarms: Vec<String>,
+    alarm: Ruling,
 }
 
 /// Every unbroken rig over every hard scene.
@@ -192,9 +207,12 @@ fn sound_runs(
     for generator in HARD {
         let world: World = fault::world(generator.name, args.seed.unwrap_or(1), Some(most))?;
         let mut tick = || tick(generator.name);
-        runs.alarms.extend(fault::false_alarms(&world, SOUND, &mut tick)?);
         let shots = u64::from(world.scene.frames) * u64::from(world.views());
         runs.frames += shots * SOUND.len() as u64;
+        let (alarms, alarm) =
+            fault::false_alarms(&world.with_canary(args.canary), SOUND, &mut tick)?;
+        runs.alarms.extend(alarms);
+        runs.alarm = runs.alarm.max(alarm);
     }
     Ok(runs)
 }
@@ -211,14 +229,16 @@ struct Hunt {
     found: Vec<u64>,
     /// Seeds that were run, from 0 on.
     run: u64,
-    /// What the gate said of the unbroken rig.
+    /// What the gate said of the unbroken rig, and what that comes to.
     false_alarms: Vec<String>,
+    alarm: Ruling,
 }
 
 impl Hunt {
     /// Looks at seeds from 0 on until the fault was caught often enough or `most` seeds are run.
-    fn new(fault: Fault, most: u64) -> Result<Self, CliError> {
-        let mut hunt = Self { fault, found: Vec::new(), run: 0, false_alarms: Vec::new() };
+    fn new(fault: Fault, most: u64, canary: Option<Canary>) -> Result<Self, CliError> {
+        let (found, false_alarms, alarm) = (Vec::new(), Vec::new(), Ruling::Held);
+        let mut hunt = Self { fault, found, run: 0, false_alarms, alarm };
         while hunt.run < most && hunt.found.len() < FINDS {
             let seeds: Vec<u64> = (hunt.run..(hunt.run + CHUNK).min(most)).collect();
             let evidence: Vec<Result<Evidence, CliError>> = seeds
@@ -226,6 +246,7 @@ impl Hunt {
                 .map(|&seed| {
                     let choice = Choice::of(seed, CULLERS, &[]);
                     let trial = Trial::of(&fault, &choice.scene()?, choice.partition);
+                    let trial = trial.with_canary(canary);
                     Ok(trial.run(&fault, &mut || !interrupted())?)
                 })
                 .collect();
@@ -234,6 +255,7 @@ impl Hunt {
                 if evidence.caught() {
                     hunt.found.push(seed);
                 }
+                hunt.alarm = hunt.alarm.max(evidence.alarm);
                 let alarms = evidence.false_alarms.into_iter();
                 hunt.false_alarms.extend(alarms.map(|line| format!("seed {seed}: {line}")));
                 hunt.run = seed + 1;
@@ -279,25 +301,26 @@ fn hunt(
     outputs: &mut Outputs<'_>,
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
-    let mut out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
+    let out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
+    let mut out = SharedFile::new(out);
     let chosen = pick(&args.fault)?;
     catch_interrupt();
     let bar = progress_bar();
     bar.set_length(chosen.len() as u64);
+    let (now, watchdog) = watched(args, &out);
     let wide = chosen.iter().map(|fault| fault.name.len()).max().unwrap_or(0).max(5);
     if !args.json {
         writeln!(streams.out, "{:<wide$} class  median seeds  caught in", "fault")?;
     }
     let (mut caught, mut alarms, mut medians) = (0, 0, Vec::new());
-    let mut done = 0;
+    let (mut ruling, mut done) = (Ruling::Held, 0);
     let ended = chosen.iter().try_for_each(|&fault| {
         bar.set_message(fault.name);
-        let hunt = Hunt::new(fault, most)?;
+        set(&now, fault.name);
+        let hunt = Hunt::new(fault, most, args.canary)?;
         bar.inc(1);
         let line = hunt.json();
-        if let Some(out) = &mut out {
-            bar.suspend(|| out.line(&line))?;
-        }
+        bar.suspend(|| out.line(&line))?;
         let median = hunt.median().map_or("NEVER".to_owned(), |median| median.to_string());
         let (found, run) = (hunt.found.len(), hunt.run);
         let text = match args.json {
@@ -311,14 +334,16 @@ fn hunt(
             bar.suspend(|| writeln!(streams.talk, "FALSE ALARM: {} {alarm}", fault.sound.name))?;
         }
         alarms += hunt.false_alarms.len();
+        ruling = ruling.max(hunt.alarm);
         caught += usize::from(!hunt.found.is_empty());
         medians.extend(hunt.median());
         done += 1;
         Ok::<(), CliError>(())
     });
+    drop(watchdog);
     bar.finish_and_clear();
     // What was finished is kept; where nothing was, what stood there before stays.
-    if let Some(out) = out.filter(|_| ended.is_ok() || done > 0) {
+    if ended.is_ok() || done > 0 {
         out.finish(&[])?;
     }
     ended?;
@@ -331,7 +356,7 @@ fn hunt(
         chosen.len(),
         medians.last().copied().unwrap_or(0)
     )?;
-    Ok(if caught == chosen.len() && alarms == 0 { EXIT_HELD } else { EXIT_FAILED })
+    Ok(exit_of(if caught == chosen.len() { ruling } else { Ruling::Failed }))
 }
 
 pub(super) fn faults(
@@ -342,27 +367,29 @@ pub(super) fn faults(
     if let Some(most) = args.swarm {
         return hunt(args, most, outputs, streams);
     }
-    let mut out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
+    let out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
+    let mut out = SharedFile::new(out);
     let chosen = pick(&args.fault)?;
     catch_interrupt();
+    let (now, watchdog) = watched(args, &out);
     let bar = progress_bar();
     let steps = if args.fault.is_empty() { chosen.len() + HARD.len() } else { chosen.len() };
     bar.set_length(steps as u64);
     let mut tried = Vec::new();
     let mut ended = chosen.iter().try_for_each(|fault| {
         bar.set_message(fault.name);
+        set(&now, fault.name);
         let one = try_fault(fault, args, &mut || !interrupted())?;
         bar.inc(1);
         let line = one.json(args);
         if args.json {
             bar.suspend(|| writeln!(streams.out, "{line}"))?;
         }
-        if let Some(out) = &mut out {
-            bar.suspend(|| out.line(&line))?;
-        }
+        bar.suspend(|| out.line(&line))?;
         tried.push(one);
         Ok(())
     });
+    set(&now, "");
     let mut sound = SoundRuns::default();
     if args.fault.is_empty() && ended.is_ok() {
         let mut last = String::new();
@@ -376,23 +403,61 @@ pub(super) fn faults(
         });
         ended = ran.map(|runs| sound = runs);
     }
+    drop(watchdog);
     bar.finish_and_clear();
     // What was finished is kept; where nothing was, what stood there before stays.
-    if let Some(out) = out.filter(|_| ended.is_ok() || !tried.is_empty()) {
+    if ended.is_ok() || !tried.is_empty() {
         out.finish(&[])?;
     }
     ended?;
-    let held = conclude(args, &tried, &sound, streams)?;
-    Ok(if held { EXIT_HELD } else { EXIT_FAILED })
+    let ruling = conclude(args, &tried, &sound, streams)?;
+    Ok(exit_of(ruling))
 }
 
-/// The table, the failures, the sums; whether all is as it must be.
+/// A watchdog over a trial, and where it is told the fault that is on trial; none while unbroken rigs run.
+fn watched(args: &FaultsArgs, out: &SharedFile<'_>) -> (Arc<Mutex<String>>, Watchdog) {
+    let now = Arc::new(Mutex::new(String::new()));
+    let (fault, out) = (Arc::clone(&now), out.at_hang());
+    let (swarm, limit) = (args.swarm, args.frame_limit);
+    let keep = move |hung: &mut Hung| {
+        let fault = fault.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut line = "plainsight faults".to_owned();
+        if !fault.is_empty() {
+            line += &format!(" --fault {fault}");
+        }
+        line += &match swarm {
+            Some(most) => format!(" --swarm {most}"),
+            None => format!(" --scene {} --seed {}", hung.scene, hung.seed),
+        };
+        hung.replay = line + &limit.replay_flags();
+        let line = json!({
+            "schema": JSON_SCHEMA,
+            "fault": fault,
+            "rig": hung.culler,
+            "scene": hung.scene,
+            "seed": hung.seed,
+            "verdict": Ruling::Failed.word(),
+            "failures": hung.failures,
+            "replay": hung.replay,
+        });
+        // The process ends as failed in any case.
+        out.finish(format!("{line}\n").as_bytes());
+    };
+    (now, Watchdog::start(&args.frame_limit, keep))
+}
+
+/// Says what is on trial.
+fn set(now: &Mutex<String>, fault: &str) {
+    fault.clone_into(&mut now.lock().unwrap_or_else(PoisonError::into_inner));
+}
+
+/// The table, the failures, the sums; what all comes to.
 fn conclude(
     args: &FaultsArgs,
     tried: &[Tried],
     sound: &SoundRuns,
     streams: &mut Streams<'_>,
-) -> Result<bool, CliError> {
+) -> Result<Ruling, CliError> {
     let to: &mut dyn std::io::Write =
         if args.json { &mut *streams.talk } else { &mut *streams.out };
     if !args.json {
@@ -424,7 +489,8 @@ fn conclude(
         alarms.len(),
         beside + sound.frames
     )?;
-    Ok(caught == tried.len() && alarms.is_empty())
+    let alarm = tried.iter().map(Tried::alarm).max().unwrap_or_default().max(sound.alarm);
+    Ok(if caught == tried.len() { alarm } else { Ruling::Failed })
 }
 
 fn table(args: &FaultsArgs, tried: &[Tried], to: &mut dyn std::io::Write) -> std::io::Result<()> {

@@ -2,9 +2,8 @@
 //! input, or from a process that is told each frame and asked what it draws. The format stands at the top
 //! of `crate::foreign`.
 
-use std::io::{BufReader, BufWriter, Write};
+use std::io::BufReader;
 use std::path::PathBuf;
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use clap::Args;
 use plainsight_reference::Tolerance;
@@ -12,17 +11,20 @@ use plainsight_reference::Tolerance;
 use super::args::{SceneArgs, quoted};
 use super::files::Files;
 use super::out_file::OutFolder;
+use super::pipe::Process;
 use super::progress::progress_bar;
-use super::run::{Named, catch_interrupt, interrupted, pick_cache};
+use super::run::{Named, error_case, exit_of, failure_lines, junit_case, pick_cache};
+use super::signals::{catch_interrupt, interrupted};
+use super::tell::heading;
 use super::waiting::Waiting;
-use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Outputs, Streams};
+use super::{CliError, OutFile, Outputs, Streams};
 use crate::check::Gate;
 use crate::foreign::{Drawn, ForeignError, frame_line, header_line};
 use crate::part::PartId;
 use crate::report::{JunitCase, Row, Shown, junit, part_picture, picture_png, table, top_view};
 use crate::run::{
-    FrameRecord, FrameState, LaneInfo, Moment, Observer, RunError, Trace, Truth, World,
-    partition_difference, render, told,
+    Cause, FrameRecord, FrameState, LaneInfo, Moment, Observer, RunError, Stop, Trace, Truth,
+    World, caught, partition_difference, render, told,
 };
 
 /// Pixels along a side of the view from above.
@@ -68,55 +70,6 @@ impl From<ForeignError> for CliError {
     }
 }
 
-/// A started culler.
-struct Process {
-    child: Child,
-    tell: Option<BufWriter<ChildStdin>>,
-    command: String,
-}
-
-impl Process {
-    fn start(command: &str) -> Result<(Self, ChildStdout), CliError> {
-        let started = Command::new("sh")
-            .args(["-c", command])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn();
-        let mut child = started.map_err(|error| {
-            CliError::Usage(format!("--pipe {}: cannot be started: {error}", quoted(command)))
-        })?;
-        let tell = child.stdin.take().map(BufWriter::new);
-        let answers = child.stdout.take().expect("its output is piped");
-        Ok((Self { child, tell, command: command.to_owned() }, answers))
-    }
-
-    /// Writes a line and sees that it gets there.
-    fn tell(&mut self, line: &str) -> Result<(), CliError> {
-        let tell = self.tell.as_mut().expect("nothing is told after the end");
-        let told = tell.write_all(line.as_bytes()).and_then(|()| tell.write_all(b"\n"));
-        told.and_then(|()| tell.flush()).map_err(|error| self.stopped(&error.to_string()))
-    }
-
-    fn stopped(&mut self, what: &str) -> CliError {
-        // What it was asked to read is closed, so that it ends by itself if it has not.
-        self.tell = None;
-        let status = self.child.wait().map_or_else(|error| error.to_string(), |s| s.to_string());
-        let command = quoted(&self.command);
-        CliError::Usage(format!(
-            "--pipe {command}: stopped before the last frame ({status}): {what}"
-        ))
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        self.tell = None;
-        // After an error it may not have ended.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
 /// The first bad frame with what was drawn in it.
 type Worst = Option<(Moment, Vec<PartId>)>;
 
@@ -133,6 +86,10 @@ impl Observer for Watch {
             self.worst = Some((record.state.moment, record.drawn.to_vec()));
         }
     }
+
+    fn stopped(&mut self, stop: &Stop) {
+        self.gate.stopped(stop);
+    }
 }
 
 pub(super) fn judge(
@@ -142,7 +99,10 @@ pub(super) fn judge(
 ) -> Result<u8, CliError> {
     let junit_file = args.junit.as_deref().map(|path| outputs.file("--junit", path)).transpose()?;
     let mut cases = Vec::new();
-    let code = judge_lane(args, &mut cases, outputs, streams);
+    // A panic leaves the file as well.
+    let code = caught(|| judge_lane(args, &mut cases, outputs, streams)).unwrap_or_else(|said| {
+        Err(CliError::Panicked { place: format!("replay: {}", outputs.again()), said })
+    });
     let Some(file) = junit_file else { return code };
     if let Err(error) = &code {
         cases.push(error_case(&args.scene, "judge", error, outputs.again()));
@@ -176,17 +136,17 @@ fn judge_lane(
     bar.finish_and_clear();
     let world = world?;
     let mut process = None;
-    // What a culler says may come late or never: a signal is not kept waiting.
-    let answers = match (file, &args.pipe) {
-        (Some(file), _) => Waiting::new(file),
+    // Answers may come late or never: a signal is not kept waiting.
+    let mut drawn = match (file, &args.pipe) {
+        (Some(file), _) => Drawn::new(BufReader::new(Waiting::new(file)), name),
         (None, Some(command)) => {
-            let (started, answers) = Process::start(command)?;
+            let limit = args.scene_args.frame_limit.time();
+            let (started, answers) = Process::start(command, limit)?;
             process = Some(started);
-            Waiting::new(answers)
+            Drawn::new(BufReader::new(answers), name)
         }
-        (None, None) => Waiting::new(std::io::stdin()),
+        (None, None) => Drawn::new(BufReader::new(Waiting::new(std::io::stdin())), name),
     };
-    let mut drawn = Drawn::new(BufReader::new(answers), name);
     let bar = progress_bar();
     bar.set_message(args.scene.clone());
     bar.inc_length(u64::from(world.scene.frames) * u64::from(world.views()));
@@ -199,7 +159,7 @@ fn judge_lane(
     if let (Some(files), Some((moment, drawn))) = (files, worst) {
         pictures(&world, moment, &drawn, files, streams)?;
     }
-    Ok(if gate.held() { EXIT_HELD } else { EXIT_FAILED })
+    Ok(exit_of(gate.ruling()))
 }
 
 /// Tells and reads every frame, and has the gate look at it.
@@ -210,10 +170,18 @@ fn gate(
     mut process: Option<&mut Process>,
     bar: &indicatif::ProgressBar,
 ) -> Result<(Trace, Gate, Worst), CliError> {
-    if let Some(process) = &mut process {
-        process.tell(&header_line(world))?;
+    let hang = || Cause::Hang(args.scene_args.frame_limit.frame_limit);
+    if let Some(process) = &process {
+        process.tell(header_line(world));
     }
-    let culler = drawn.header()?;
+    let culler = match drawn.header() {
+        Ok(culler) => culler,
+        // It is named by its command, and ends in frame 0.
+        Err(_) if process.as_ref().is_some_and(|process| process.is_late()) => {
+            args.pipe.clone().unwrap_or_default()
+        }
+        Err(error) => return Err(explained(error, process)),
+    };
     let info = LaneInfo {
         culler,
         oracle: "told",
@@ -223,24 +191,53 @@ fn gate(
     };
     let parts = world.partition.part_count();
     let mut watch = Watch { gate: Gate::forgiving(args.scene_args.late), worst: None };
-    let mut says = |state: &FrameState| -> Result<Vec<PartId>, CliError> {
+    let mut says = |state: &FrameState| -> Result<Result<Vec<PartId>, Cause>, CliError> {
         if interrupted() {
             return Err(RunError::Interrupted.into());
         }
-        if let Some(process) = &mut process {
-            process.tell(&frame_line(world, state))?;
+        if let Some(process) = &process {
+            if process.is_late() {
+                return Ok(Err(hang()));
+            }
+            process.tell(frame_line(world, state));
+            process.waits();
         }
-        let said = drawn.at(state.moment, parts)?;
+        let said = match drawn.at(state.moment, parts) {
+            Ok(said) => said,
+            Err(_) if process.as_ref().is_some_and(|process| process.is_late()) => {
+                return Ok(Err(hang()));
+            }
+            Err(error) => return Err(explained(error, process.as_deref_mut())),
+        };
         bar.inc(1);
-        Ok(said)
+        Ok(Ok(said))
     };
-    let trace = told(world, world.scene.frames, &info, &mut says, &mut watch)?;
-    if let Some(process) = process {
-        // It sees that nothing more comes, and has its last word.
-        process.tell = None;
+    let mut trace = told(world, world.scene.frames, &info, &mut says, &mut watch)?;
+    if trace.stop.is_some() {
+        return Ok((trace, watch.gate, watch.worst));
     }
-    drawn.end()?;
+    if let Some(process) = &mut process {
+        // It has its last word.
+        process.end();
+    }
+    let ended = drawn.end();
+    if ended.is_err() && process.as_ref().is_some_and(|process| process.is_late()) {
+        let moment = trace.frames.last().map(|frame| frame.moment);
+        let stop = Stop { moment, again: false, cause: hang() };
+        watch.stopped(&stop);
+        trace.stop = Some(stop);
+    } else {
+        ended?;
+    }
     Ok((trace, watch.gate, watch.worst))
+}
+
+/// The error, or that the process ended before its time, if it did.
+fn explained(error: ForeignError, process: Option<&mut Process>) -> CliError {
+    match process {
+        Some(process) => process.explained(error),
+        None => error.into(),
+    }
 }
 
 fn replay(args: &JudgeArgs, world: &World) -> String {
@@ -249,11 +246,9 @@ fn replay(args: &JudgeArgs, world: &World) -> String {
         (None, pipe) => format!("--pipe {}", quoted(pipe.as_deref().unwrap_or_default())),
     };
     format!(
-        "plainsight judge --scene {} --seed {} --frames {} {from}{}",
+        "plainsight judge --scene {} {from}{}",
         quoted(&args.scene),
-        world.scene.seed,
-        world.scene.frames,
-        args.scene_args.replay_flags()
+        args.scene_args.replay_flags(&world.scene)
     )
 }
 
@@ -272,41 +267,10 @@ fn tell(
     }
     let failures = failure_lines(gate, trace);
     if !failures.is_empty() {
-        writeln!(streams.talk, "FAILED: {}", trace.lane.culler)?;
+        writeln!(streams.talk, "{}", heading(gate, &trace.lane.culler, trace.lane.oracle))?;
         failures.iter().try_for_each(|line| writeln!(streams.talk, "  {line}"))?;
     }
-    Ok(junit_case(&row, failures))
-}
-
-/// What the gate says of a lane, the line that replays it last; nothing where it held.
-pub(super) fn failure_lines(gate: &Gate, trace: &Trace) -> Vec<String> {
-    let mut lines = gate.failures();
-    if !lines.is_empty() {
-        lines.push(format!("replay: {}", trace.lane.replay));
-    }
-    lines
-}
-
-/// The lane of a row.
-pub(super) fn junit_case(row: &Row, failures: Vec<String>) -> JunitCase {
-    JunitCase {
-        scene: row.scene.clone(),
-        name: format!("{}@{}", row.culler, row.oracle),
-        seconds: row.wall_ms / 1000.0,
-        failures,
-        errors: Vec::new(),
-    }
-}
-
-/// A case that came to no verdict: why, and the line that runs it again.
-pub(super) fn error_case(scene: &str, name: &str, error: &CliError, again: &str) -> JunitCase {
-    JunitCase {
-        scene: scene.to_owned(),
-        name: name.to_owned(),
-        seconds: 0.0,
-        failures: Vec::new(),
-        errors: vec![error.to_string(), format!("replay: {again}")],
-    }
+    Ok(junit_case(&row, gate.ruling(), failures))
 }
 
 /// The pictures of a bad frame.

@@ -12,18 +12,24 @@ mod files;
 mod judge;
 mod list;
 mod merge;
+mod oracles;
 mod out_file;
 mod picture;
+mod pipe;
+mod plan;
 mod progress;
 mod quiet;
+mod repeat;
 mod replay;
 mod report;
 mod run;
 mod signals;
 mod stress;
 mod target;
+mod tell;
 mod thesis;
 mod waiting;
+mod watchdog;
 mod why;
 
 use std::cell::RefCell;
@@ -39,16 +45,16 @@ use out_file::{OutFile, Outputs};
 use crate::cull::CullerKind;
 use crate::oracle::OracleError;
 use crate::part::CacheError;
-use crate::run::RunError;
+use crate::run::{RunError, caught};
 use crate::scene::SceneError;
 
 /// Everything held.
 pub const EXIT_HELD: u8 = 0;
-/// A check failed.
+/// A check failed, or something panicked.
 pub const EXIT_FAILED: u8 = 1;
 /// Bad usage or input.
 pub const EXIT_USAGE: u8 = 2;
-/// A device was lost, or missing where one was required.
+/// A device was lost, did not repeat, or was missing where one was required.
 pub const EXIT_DEVICE: u8 = 3;
 /// Stopped by the user, as shells count it: 128 + SIGINT. By SIGTERM it is 143, by SIGHUP 129.
 pub const EXIT_INTERRUPTED: u8 = 130;
@@ -76,6 +82,8 @@ enum CliError {
     Usage(String),
     #[error("{0}; choose another --cache")]
     Cache(#[from] CacheError),
+    #[error("panic: {place}: {said}")]
+    Panicked { place: String, said: String },
     #[error("writing the results: {0}")]
     Stream(#[from] std::io::Error),
 }
@@ -91,6 +99,7 @@ impl CliError {
         match self {
             Self::Run(RunError::Interrupted) => signals::exit_interrupted(),
             Self::Run(RunError::Oracle(_)) => EXIT_DEVICE,
+            Self::Panicked { .. } => EXIT_FAILED,
             // A reader that has had enough (`| head`) is no error of ours, and no pass either.
             Self::Stream(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {
                 EXIT_READER_GONE
@@ -133,6 +142,13 @@ pub fn main(
     };
     let verb = cli.verb.unwrap_or_default();
     let files = files(&verb);
+    // A panic that no lane answers for, of a culler or not, is a failure all the same.
+    let guarded = |outputs: &mut Outputs<'_>, streams: &mut Streams<'_>| {
+        let again = outputs.again().to_owned();
+        caught(|| run_verb(verb, cullers, outputs, streams)).unwrap_or_else(|said| {
+            Err(CliError::Panicked { place: format!("replay: {again}"), said })
+        })
+    };
     let words = args.iter().skip(1).map(|word| quoted(&word.to_string_lossy()));
     let again = std::iter::once("plainsight".to_owned()).chain(words).collect::<Vec<_>>().join(" ");
     let Streams { out, talk, width } = streams;
@@ -141,11 +157,11 @@ pub fn main(
         let (mut tables, mut words) = (Shared(&talk), Shared(&talk));
         let mut streams = Streams { out: &mut tables, talk: &mut words, width: None };
         Outputs::new(&files, Some(out), again)
-            .and_then(|mut outputs| run_verb(verb, cullers, &mut outputs, &mut streams))
+            .and_then(|mut outputs| guarded(&mut outputs, &mut streams))
     } else {
         let mut streams = Streams { out: &mut *out, talk: &mut *talk, width };
         Outputs::new(&files, None, again).and_then(|mut outputs| {
-            let code = run_verb(verb, cullers, &mut outputs, &mut streams)?;
+            let code = guarded(&mut outputs, &mut streams)?;
             streams.out.flush()?;
             Ok(code)
         })

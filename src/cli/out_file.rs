@@ -127,12 +127,12 @@ impl<'a> Outputs<'a> {
         if is_stream(path) {
             let stream = self.stream.take();
             let stream = stream.ok_or_else(|| refuse("standard output is taken".to_owned()))?;
-            return Ok(OutFile { label, to: To::Stream(stream) });
+            return Ok(OutFile::Stream(stream));
         }
         if fs::canonicalize(path).is_ok_and(|path| path == Path::new(NULL))
             && fs::metadata(path).is_ok_and(|there| !there.is_file())
         {
-            return Ok(OutFile { label, to: To::Nowhere });
+            return Ok(OutFile::File(WholeFile { label, path: None, lines: None }));
         }
         let target = Target::of(path).map_err(refuse)?;
         let own = Identity::new(target.path.clone(), target.there.as_ref());
@@ -146,7 +146,7 @@ impl<'a> Outputs<'a> {
         tempfile::tempfile_in(target.folder())
             .map_err(|error| refuse(format!("cannot write: {error}; choose another file")))?;
         self.taken.push((label.clone(), own));
-        Ok(OutFile { label, to: To::File { path: path.to_owned(), lines: None } })
+        Ok(OutFile::File(WholeFile { label, path: Some(path.to_owned()), lines: None }))
     }
 
     /// A folder for files, made if it is not there, which `flag` named.
@@ -212,61 +212,69 @@ impl Drop for OutFolder {
     }
 }
 
-/// An output: a file that appears whole or not at all, or a stream.
-pub(super) struct OutFile<'a> {
-    /// The flag and the path.
-    label: String,
-    to: To<'a>,
+/// An output: a file, or standard output.
+pub(super) enum OutFile<'a> {
+    /// The caller's own stream.
+    Stream(&'a mut dyn Write),
+    /// A file that any thread may end.
+    File(WholeFile),
 }
 
-enum To<'a> {
-    Stream(&'a mut dyn Write),
-    Nowhere,
-    File {
-        path: PathBuf,
-        /// Lines so far, in a file without a name.
-        lines: Option<BufWriter<File>>,
-    },
+/// A file that appears whole or not at all.
+pub(super) struct WholeFile {
+    /// The flag and the path.
+    label: String,
+    /// Where it will be; `None` for nowhere.
+    path: Option<PathBuf>,
+    /// Lines so far, in a file without a name.
+    lines: Option<BufWriter<File>>,
 }
 
 impl OutFile<'_> {
     /// Adds a line to what [`OutFile::finish`] will leave; a stream has it at once.
     pub(super) fn line(&mut self, line: &str) -> Result<(), CliError> {
-        match &mut self.to {
-            To::Stream(stream) => {
+        match self {
+            Self::Stream(stream) => {
                 writeln!(stream, "{line}")?;
-                stream.flush()?;
+                Ok(stream.flush()?)
             }
-            To::Nowhere => {}
-            To::File { path, lines } => {
-                let mut write = |path: &Path| {
-                    if lines.is_none() {
-                        let target = Target::of(path)?;
-                        let file = tempfile::tempfile_in(target.folder());
-                        *lines = Some(BufWriter::new(file.map_err(|error| error.to_string())?));
-                    }
-                    let lines = lines.as_mut().expect("it was just made");
-                    writeln!(lines, "{line}").map_err(|error| error.to_string())
-                };
-                write(path).map_err(|what| unwritten(&self.label, &what))?;
-            }
+            Self::File(file) => file.line(line),
         }
-        Ok(())
     }
 
     /// Writes the lines so far and `bytes`.
     pub(super) fn finish(self, bytes: &[u8]) -> Result<(), CliError> {
-        match self.to {
-            To::Stream(stream) => {
+        match self {
+            Self::Stream(stream) => {
                 stream.write_all(bytes)?;
-                stream.flush()?;
-                Ok(())
+                Ok(stream.flush()?)
             }
-            To::Nowhere => Ok(()),
-            To::File { path, lines } => {
-                replace(&path, lines, bytes).map_err(|what| unwritten(&self.label, &what))
-            }
+            Self::File(file) => file.finish(bytes),
         }
+    }
+}
+
+impl WholeFile {
+    /// Adds a line to what [`WholeFile::finish`] will leave.
+    pub(super) fn line(&mut self, line: &str) -> Result<(), CliError> {
+        let Some(path) = &self.path else { return Ok(()) };
+        let mut write = || {
+            if self.lines.is_none() {
+                let target = Target::of(path)?;
+                let file = tempfile::tempfile_in(target.folder());
+                self.lines = Some(BufWriter::new(file.map_err(|error| error.to_string())?));
+            }
+            let lines = self.lines.as_mut().expect("it was just made");
+            writeln!(lines, "{line}").map_err(|error| error.to_string())
+        };
+        write().map_err(|what| unwritten(&self.label, &what))
+    }
+
+    /// Writes the lines so far and `bytes`.
+    pub(super) fn finish(self, bytes: &[u8]) -> Result<(), CliError> {
+        let Self { label, path, lines } = self;
+        let Some(path) = path else { return Ok(()) };
+        replace(&path, lines, bytes).map_err(|what| unwritten(&label, &what))
     }
 }
 

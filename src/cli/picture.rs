@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::args::{Layer, PictureArgs};
 use super::progress::progress_bar;
+use super::repeat::RepeatArgs;
 use super::run::one_lane;
 use super::signals::catch_interrupt;
 use super::{CliError, EXIT_HELD, Outputs, Streams};
@@ -57,7 +58,7 @@ pub(super) fn picture(
         scene_args.frames = Some(args.frame.saturating_add(1).max(24));
     }
     let lane = (args.scene.as_str(), &args.culler, &args.oracle);
-    let (plan, named) = one_lane(lane, &scene_args, cullers, streams)?;
+    let (plan, named) = one_lane(lane, (&scene_args, RepeatArgs::default()), cullers, streams)?;
     catch_interrupt();
     let bar = progress_bar();
     let world = named.world(&scene_args, plan.cache.as_ref(), &bar, streams);

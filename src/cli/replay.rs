@@ -4,8 +4,12 @@ use serde_json::json;
 
 use super::args::ReplayArgs;
 use super::progress::progress_bar;
-use super::run::{catch_interrupt, one_lane, tell_failures};
-use super::{CliError, EXIT_FAILED, EXIT_HELD, Streams};
+use super::run::{exit_of, one_lane, tell_failures};
+use super::signals::catch_interrupt;
+use super::tell::loud;
+use super::watchdog::Watchdog;
+use super::{CliError, Streams};
+use crate::check::Ruling;
 use crate::cull::CullerKind;
 use crate::report::{JSON_SCHEMA, MemoryFigures};
 use crate::run::FrameTrace;
@@ -15,36 +19,34 @@ pub(super) fn replay(
     cullers: &[CullerKind],
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
-    let (plan, named) =
-        one_lane((&args.scene, &args.culler, &args.oracle), &args.scene_args, cullers, streams)?;
+    let lane = (args.scene.as_str(), &args.culler, &args.oracle);
+    let (plan, named) = one_lane(lane, (&args.scene_args, args.repeat), cullers, streams)?;
     catch_interrupt();
     let bar = progress_bar();
+    let watchdog = Watchdog::start(&args.scene_args.frame_limit, |_| {});
     let finished = plan.run(&named, &bar, streams);
+    drop(watchdog);
     bar.finish_and_clear();
     let finished = finished?;
-    let (trace, gate) = (&finished.traces[0], &finished.gates[0]);
+    let (trace, gate, why) = (&finished.traces[0], &finished.gates[0], &finished.whys[0]);
     for frame in &trace.frames {
         let line = if args.json { json_line(frame) } else { text_line(frame) };
         writeln!(streams.out, "{line}")?;
     }
     let hash = format!("{:016x}", trace.hash());
-    tell_failures(gate, trace, streams)?;
-    let mut held = gate.held();
+    tell_failures((gate, trace, why), streams)?;
+    let mut ruling = gate.ruling();
     if let Some(expected) = args.expect.as_ref().filter(|expected| **expected != hash) {
         writeln!(
             streams.talk,
             "trace hash {hash} is not the expected {expected}: another build, device or scene"
         )?;
-        held = false;
+        ruling = Ruling::Failed;
     }
     if !args.json {
-        writeln!(
-            streams.out,
-            "trace hash {hash}, verdict: {}",
-            if held { "held" } else { "FAILED" }
-        )?;
+        writeln!(streams.out, "trace hash {hash}, verdict: {}", loud(ruling))?;
     }
-    Ok(if held { EXIT_HELD } else { EXIT_FAILED })
+    Ok(exit_of(ruling))
 }
 
 fn json_line(frame: &FrameTrace) -> String {

@@ -9,18 +9,20 @@ use super::args::SceneArgs;
 use super::files::Files;
 use super::merge::{Merged, merged};
 use super::progress::progress_bar;
+use super::repeat::RepeatArgs;
 use super::run::{
-    Finished, Named, Oracles, Plan, REPEAT, matching, pick_cache, pick_cost, pick_cullers,
+    Finished, Named, Oracles, Plan, exit_of, matching, pick_cache, pick_cost, pick_cullers,
     pick_index,
 };
 use super::signals::catch_interrupt;
-use super::{CliError, EXIT_FAILED, EXIT_HELD, Outputs, Streams};
+use super::watchdog::Watchdog;
+use super::{CliError, Outputs, Streams};
 use crate::cull::CullerKind;
 use crate::report::{
     Chart, Page, PageAccuracy, PageLane, PagePictures, PageScene, PageSweep, Series, Shown,
     difference_picture, part_picture, picture_png, top_view,
 };
-use crate::run::{FrameRecord, FrameTrace, Trace, render};
+use crate::run::{FrameRecord, FrameTrace, Moment, Trace, render};
 use crate::scene::Viewport;
 use crate::stress::Outcome;
 
@@ -115,7 +117,7 @@ pub(super) fn report(
     let cache = pick_cache(&scene_args)?;
     let adapter = scene_args.adapter.as_deref();
     let oracles = Oracles::open(&args.oracle, adapter, streams)?.simulating(&cost, &scene_args);
-    let (cullers, repeat, with_bound) = (chosen, REPEAT, false);
+    let (cullers, repeat, with_bound) = (chosen, RepeatArgs::default(), false);
     let plan = Plan { cullers, index, oracles, cost, cache, repeat, with_bound, args: &scene_args };
     catch_interrupt();
     let bar = progress_bar();
@@ -126,6 +128,8 @@ pub(super) fn report(
         sweep,
         accuracy,
     };
+    // A page of some lanes is none: where one hangs, what stood there before stays.
+    let watchdog = Watchdog::start(&scene_args.frame_limit, |_| {});
     for named in &scenes {
         let shots = named.scene().frames as usize * named.scene().cameras.len();
         let every =
@@ -143,18 +147,19 @@ pub(super) fn report(
             })?;
         page.scenes.push(scene(finished, pictures));
     }
+    drop(watchdog);
     bar.finish_and_clear();
     let html = page.html();
     out.finish(html.as_bytes())?;
     let (held, lanes) = page.held();
-    let word = if page.failed() { "failed" } else { "held" };
+    let word = page.ruling();
     writeln!(
         streams.out,
         "verdict: {word} ({held} of {lanes} lanes held); {:.1} MiB in {}",
         html.len() as f64 / (1 << 20) as f64,
         args.out.display()
     )?;
-    Ok(if page.failed() { EXIT_FAILED } else { EXIT_HELD })
+    Ok(exit_of(page.ruling()))
 }
 
 /// The command, as far as it says what was run.
@@ -200,9 +205,10 @@ fn figures(frame: &FrameTrace) -> [f64; 6] {
 }
 
 fn scene(finished: Finished, pictures: Vec<(usize, PagePictures)>) -> PageScene {
-    let Finished { world, traces, gates } = finished;
-    let shots: Vec<[u32; 2]> =
-        traces[0].frames.iter().map(|f| [f.moment.frame, f.moment.view]).collect();
+    let Finished { world, traces, gates, .. } = finished;
+    // A lane that ended early has fewer.
+    let shots = Moment::all(&world, world.scene.frames).map(|m| [m.frame, m.view]);
+    let shots: Vec<[u32; 2]> = shots.collect();
     // A shot without pictures shows those of the one before.
     let shown = |shot: usize| pictures.iter().rfind(|(place, _)| *place <= shot);
     let pictures: Vec<PagePictures> =
@@ -210,6 +216,7 @@ fn scene(finished: Finished, pictures: Vec<(usize, PagePictures)>) -> PageScene 
     let lanes = traces.iter().zip(&gates).map(|(trace, gate)| PageLane {
         culler: trace.lane.culler.clone(),
         oracle: trace.lane.oracle.to_owned(),
+        ruling: gate.ruling(),
         failures: gate.failures(),
         replay: trace.lane.replay.clone(),
         frames: trace.frames.iter().map(figures).collect(),
@@ -270,7 +277,7 @@ fn sweep(Merged { tally, missing }: &Merged) -> PageSweep {
         .failures
         .iter()
         .take(NAMED_FAILURES)
-        .map(|failure| named(format!("failed: {}", failure.failures.join("; ")), failure))
+        .map(|o| named(format!("{}: {}", o.ruling(), o.failures.join("; ")), o))
         .collect();
     worst.extend(tally.worst_excess.iter().map(|o| {
         let vain = a_frame(o.drawn.saturating_sub(o.visible), o);
@@ -291,7 +298,7 @@ fn sweep(Merged { tally, missing }: &Merged) -> PageSweep {
             tally.failed,
             missing.iter().map(|what| format!("; missing: {what}")).collect::<String>()
         ),
-        failed: tally.failed > 0,
+        ruling: tally.ruling,
         situations: tally
             .probes()
             .into_iter()

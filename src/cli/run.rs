@@ -1,445 +1,77 @@
 //! `run`: scenes × cullers × oracles, side by side under one truth.
 
-use std::cell::RefCell;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use indicatif::ProgressBar;
+use serde_json::json;
 
-use super::args::{RunArgs, SceneArgs, quoted};
-use super::judge::{error_case, failure_lines, junit_case};
-use super::progress::{counting_triangles, progress_bar};
-use super::quiet::quietly;
-use super::signals::stoppable;
-pub(super) use super::signals::{catch_interrupt, interrupted};
-use super::{CliError, EXIT_FAILED, EXIT_HELD, Outputs, Streams};
-use crate::check::Gate;
-use crate::cull::{Culler, CullerKind, CullerSetup, PerView};
-use crate::index::{Entry, INDEXES, IndexKind};
-use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
-use crate::oracle::{
-    Always, Approximate, CostModel, HierarchicalZ, Oracle, OracleError, Questions, Schedule, Sim,
-    Simulated, Stage,
+use super::args::{RunArgs, quoted};
+use super::progress::progress_bar;
+use super::signals::catch_interrupt;
+use super::watchdog::{AtHang, Hung, SharedFile, Watchdog};
+use super::{CliError, EXIT_FAILED, Outputs, Streams};
+use crate::check::Ruling;
+use crate::cull::CullerKind;
+use crate::report::{JSON_SCHEMA, JunitCase, JunitEnd, Row, junit, table};
+use crate::run::{caught, partition_difference};
+
+pub(super) use super::oracles::{Oracles, StagedOracles};
+pub(super) use super::plan::{
+    Finished, Named, Plan, matching, one_lane, pick_cache, pick_cost, pick_cullers, pick_index,
 };
-use crate::part::{Cache, PartId};
-use crate::report::{JunitCase, Row, junit, table};
-use crate::run::{
-    FrameRecord, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World,
-    partition_difference, run as run_lanes,
-};
-use crate::scene::{Scene, generate};
+pub(super) use super::tell::{error_case, exit_of, failure_lines, junit_case, loud, tell_failures};
 
-/// What is run a second time to see that it repeats.
-pub(super) const REPEAT: Repeat = Repeat::first(1);
 /// The scenes of the default run.
 const DEFAULT_SCENES: [&str; 4] = ["bunnies", "city", "rooms", "soup"];
 /// Frames of the default run: 24 at full size take over two minutes on two cores, and the default
 /// is to answer within one. Naming a scene or `--frames` lifts the cut.
 const DEFAULT_RUN_FRAMES: u32 = 6;
-/// How many of the cullers the default run takes.
-const DEFAULT_CULLERS: usize = 3;
 
-/// The oracles of one invocation; the device is opened once.
-pub(super) struct Oracles {
-    names: Vec<String>,
-    gpu: Option<Arc<Gpu>>,
-    /// What the simulated device costs and does.
-    simulated: (CostModel, Schedule),
-}
-
-impl Oracles {
-    /// Whether every name is one of an oracle.
-    pub(super) fn known(names: &[String]) -> Result<(), CliError> {
-        let known: Vec<&str> = ["sim", "hierarchical-z", "simulated", "last-frame", "always"]
-            .into_iter()
-            .chain(Questions::ALL.map(Questions::name))
-            .collect();
-        names.iter().find(|name| !known.contains(&name.as_str())).map_or(Ok(()), |name| {
-            let what = format!("no oracle is called '{name}'; there are {}", known.join(", "));
-            Err(CliError::Usage(what))
-        })
-    }
-
-    /// Opens what the names need. Without names: `sim`, and `hardware` where there is a device.
-    pub(super) fn open(
-        names: &[String],
-        adapter: Option<&str>,
-        streams: &mut Streams<'_>,
-    ) -> Result<Self, CliError> {
-        let wanted = names.is_empty() || names.iter().any(|name| on_device(name));
-        let found = if wanted {
-            quietly(|| Gpu::open(adapter))
-        } else {
-            Err(OracleError::NoDevice(String::new()))
-        };
-        let asked_for = !names.is_empty() || adapter.is_some();
-        let mut names = if names.is_empty() {
-            vec!["sim".to_owned(), "hardware".to_owned()]
-        } else {
-            names.to_vec()
-        };
-        let simulated = (CostModel::lavapipe(), Schedule::default());
-        match found {
-            Ok(gpu) => Ok(Self { names, gpu: Some(gpu), simulated }),
-            Err(error) if wanted && asked_for => Err(error.into()),
-            Err(error) => {
-                if wanted {
-                    writeln!(streams.talk, "WARNING: {error}")?;
-                    writeln!(
-                        streams.talk,
-                        "WARNING: no hardware queries are judged; the simulated device runs alone"
-                    )?;
-                }
-                names.retain(|name| !on_device(name));
-                Ok(Self { names, gpu: None, simulated })
-            }
-        }
-    }
-
-    /// The same with a simulated device of that cost, which does what the flags say.
-    pub(super) fn simulating(self, cost: &CostModel, args: &SceneArgs) -> Self {
-        Self { simulated: (cost.clone(), args.schedule()), ..self }
-    }
-
-    /// One oracle a name for `stage`, made anew for each lane; the geometry on the device is shared. The
-    /// simulated device has its streams from `seed`.
-    pub(super) fn stage(&self, stage: &Stage, seed: u64) -> Result<StagedOracles<'_>, OracleError> {
-        let (cost, schedule) = self.simulated.clone();
-        Ok(StagedOracles {
-            names: &self.names,
-            simulated: (cost, Schedule { seed, ..schedule }),
-            stage: stage.clone(),
-            gpu: self.gpu.as_ref().map(|gpu| GpuStage::new(gpu, stage)).transpose()?,
-        })
-    }
-}
-
-/// Whether the oracle of that name asks a real device.
-fn on_device(name: &str) -> bool {
-    Questions::of(name).is_some()
-}
-
-/// The oracles of one invocation over one scene.
-pub(super) struct StagedOracles<'a> {
-    names: &'a [String],
-    simulated: (CostModel, Schedule),
-    stage: Stage,
-    gpu: Option<Arc<GpuStage>>,
-}
-
-impl StagedOracles<'_> {
-    /// One of that name.
-    pub(super) fn make(&self, name: &str) -> Result<Box<dyn Oracle>, OracleError> {
-        match name {
-            "sim" => Ok(Box::new(Sim::new(self.stage.clone()))),
-            "hierarchical-z" => Ok(Box::new(HierarchicalZ::new(self.stage.clone()))),
-            "simulated" => {
-                let (cost, schedule) = self.simulated.clone();
-                Ok(Box::new(Simulated::new(self.stage.clone(), cost, schedule)))
-            }
-            "last-frame" => Ok(Box::new(Approximate::last_frame(self.stage.clone()))),
-            "always" => Ok(Box::<Always>::default()),
-            _ => {
-                let stage = self.gpu.as_ref().expect("hardware is named only where it was opened");
-                let questions = Questions::of(name).expect("names are checked before");
-                Ok(Box::new(Hardware::new(stage, questions)?))
-            }
-        }
-    }
-}
-
-/// The cullers of `names`, or the first three.
-pub(super) fn pick_cullers(
-    names: &[String],
-    cullers: &[CullerKind],
-) -> Result<Vec<CullerKind>, CliError> {
-    if names.is_empty() {
-        return Ok(cullers.iter().take(DEFAULT_CULLERS).copied().collect());
-    }
-    let pick = |name: &String| {
-        cullers.iter().find(|c| c.name == name).copied().ok_or_else(|| {
-            let known: Vec<&str> = cullers.iter().map(|c| c.name).collect();
-            CliError::Usage(format!("no culler is called '{name}'; there are {}", known.join(", ")))
-        })
-    };
-    names.iter().map(pick).collect()
-}
-
-/// The index of that name.
-pub(super) fn pick_index(name: &str) -> Result<IndexKind, CliError> {
-    INDEXES.iter().find(|i| i.name == name).copied().ok_or_else(|| {
-        let known: Vec<&str> = INDEXES.iter().map(|i| i.name).collect();
-        CliError::Usage(format!("no index is called '{name}'; there are {}", known.join(", ")))
-    })
-}
-
-/// The scenes that names with `*` stand for.
-pub(super) fn matching(names: &[&str]) -> Result<Vec<String>, CliError> {
-    let each = names.iter().map(|name| Ok(generate::matching(name)?));
-    Ok(each.collect::<Result<Vec<_>, CliError>>()?.concat())
-}
-
-/// A scene as the user named it. All are opened before any device, so that bad input is the first and
-/// only thing said.
-pub(super) struct Named {
-    name: String,
-    scene: Scene,
-}
-
-impl Named {
-    /// The scene of that name or file.
-    pub(super) fn open(name: &str, args: &SceneArgs) -> Result<Self, CliError> {
-        Ok(Self { name: name.to_owned(), scene: generate::open(name, &args.knobs())? })
-    }
-
-    /// The description.
-    pub(super) fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
-    /// Whether `--mesh` decides what is seen in it.
-    pub(super) fn takes_a_mesh(&self) -> bool {
-        self.scene.name == "bunnies" || self.scene.name.starts_with("model-")
-    }
-
-    /// The scene cut into parts; says what was wrong with files of the cache.
-    ///
-    /// # Errors
-    /// Where a device of `--memory` could not hold some mesh.
-    pub(super) fn world(
-        &self,
-        args: &SceneArgs,
-        cache: Option<&Cache>,
-        bar: &ProgressBar,
-        streams: &mut Streams<'_>,
-    ) -> Result<World, CliError> {
-        let message = format!("{}: object trees", self.name);
-        let make = |progress: &(dyn Fn(u64, u64) + Sync)| {
-            World::make(self.scene.clone(), args.partition(&self.scene), cache, progress)
-        };
-        let world = stoppable(|| counting_triangles(bar, message, make))?;
-        let world = world.rendered(args.render());
-        bar.suspend(|| {
-            let warnings = &world.made.warnings;
-            warnings.iter().try_for_each(|line| writeln!(streams.talk, "WARNING: {line}"))
-        })?;
-        let Some(memory) = args.memory() else { return Ok(world) };
-        world
-            .within(memory)
-            .map_err(|error| CliError::Usage(format!("--memory, {}: {error}", self.name)))
-    }
-}
-
-/// One scene's lanes, run.
-pub(super) struct Finished {
-    pub(super) world: World,
-    pub(super) traces: Vec<Trace>,
-    pub(super) gates: Vec<Gate>,
-}
-
-/// Keeps what was drawn at one moment.
-struct DrawnAt(Moment, Vec<PartId>);
-
-impl Observer for DrawnAt {
-    fn frame(&mut self, record: &FrameRecord<'_>) {
-        if record.state.moment == self.0 {
-            self.1 = record.drawn.to_vec();
-        }
-    }
-}
-
-/// A lane's gate, and who else looks.
-struct Watched<'a, 'b> {
-    gate: &'a mut Gate,
-    lane: usize,
-    watch: &'a RefCell<&'b mut Watch<'b>>,
-}
-
-/// Sees a frame of a lane, by the lane's number.
-pub(super) type Watch<'a> = dyn FnMut(usize, &FrameRecord<'_>) + 'a;
-
-impl Observer for Watched<'_, '_> {
-    fn frame(&mut self, record: &FrameRecord<'_>) {
-        self.gate.frame(record);
-        (self.watch.borrow_mut())(self.lane, record);
-    }
-
-    fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
-        self.gate.repeated(first, again);
-    }
-}
-
-/// Everything that stays the same from scene to scene.
-pub(super) struct Plan<'a> {
-    pub(super) cullers: Vec<CullerKind>,
-    pub(super) index: IndexKind,
-    pub(super) oracles: Oracles,
-    pub(super) cost: CostModel,
-    /// Where cut meshes are kept, if anywhere.
-    pub(super) cache: Option<Cache>,
-    pub(super) repeat: Repeat,
-    /// Whether each device is measured as well on the visible parts alone.
-    pub(super) with_bound: bool,
-    pub(super) args: &'a SceneArgs,
-}
-
-/// The cost model of that name or file.
-pub(super) fn pick_cost(args: &SceneArgs) -> Result<CostModel, CliError> {
-    CostModel::open(&args.cost).map_err(CliError::Usage)
-}
-
-/// The cache of that folder, made if it is not there.
-pub(super) fn pick_cache(args: &SceneArgs) -> Result<Option<Cache>, CliError> {
-    Ok(args.cache.as_deref().map(Cache::open).transpose()?)
-}
-
-impl Plan<'_> {
-    /// Runs every lane of one scene.
-    pub(super) fn run(
-        &self,
-        named: &Named,
-        bar: &ProgressBar,
-        streams: &mut Streams<'_>,
-    ) -> Result<Finished, CliError> {
-        self.run_after(named, bar, streams, &mut |_, _| Ok(()))
-    }
-
-    /// The same; `built` sees the world before anything is run on it.
-    pub(super) fn run_after(
-        &self,
-        named: &Named,
-        bar: &ProgressBar,
-        streams: &mut Streams<'_>,
-        built: &mut dyn FnMut(&World, &mut Streams<'_>) -> std::io::Result<()>,
-    ) -> Result<Finished, CliError> {
-        self.run_watched(named, bar, streams, built, &mut |_, _| {})
-    }
-
-    /// The same; `watch` sees every frame of every lane, by the lane's number.
-    pub(super) fn run_watched(
-        &self,
-        named: &Named,
-        bar: &ProgressBar,
-        streams: &mut Streams<'_>,
-        built: &mut dyn FnMut(&World, &mut Streams<'_>) -> std::io::Result<()>,
-        watch: &mut dyn FnMut(usize, &FrameRecord<'_>),
-    ) -> Result<Finished, CliError> {
-        let name = &named.name;
-        let world = named.world(self.args, self.cache.as_ref(), bar, streams)?;
-        bar.suspend(|| built(&world, streams))?;
-        let frames = world.scene.frames;
-        let stage = world.stage();
-        let staged = self.oracles.stage(&stage, world.scene.seed)?;
-        let entries = world.entries();
-        let mut gates: Vec<Gate> = Vec::new();
-        let lanes: Vec<(&str, CullerKind)> = staged
-            .names
-            .iter()
-            .flat_map(|oracle| self.cullers.iter().map(move |&culler| (oracle.as_str(), culler)))
-            .collect();
-        gates.resize_with(lanes.len(), || Gate::forgiving(self.args.late));
-        let watch = RefCell::new(watch);
-        let watched = |(lane, gate)| Watched { gate, lane, watch: &watch };
-        let mut observers: Vec<Watched<'_, '_>> =
-            gates.iter_mut().enumerate().map(watched).collect();
-        let shots = (u64::from(frames) + self.repeat.total(frames)) * u64::from(world.views());
-        bar.inc_length(shots * lanes.len() as u64);
-        let mut running: Vec<Lane<'_>> = Vec::new();
-        for (&(oracle, kind), observer) in lanes.iter().zip(&mut observers) {
-            let oracle = staged.make(oracle)?;
-            let replay = self.replay_line(name, &world, kind.name, oracle.name());
-            let info = LaneInfo::of(kind.name, oracle.as_ref(), replay);
-            let culler = self.factory(kind, &world, &entries);
-            let first = running.iter().all(|lane| lane.info.oracle != info.oracle);
-            let with_bound = self.with_bound && first;
-            running.push(Lane { info, culler, oracle, observer, with_bound });
-        }
-        bar.set_message(name.clone());
-        let mut tick = || {
-            bar.inc(1);
-            !interrupted()
-        };
-        let traces = run_lanes(&world, frames, self.repeat, &mut running, &mut tick)?;
-        drop(running);
-        drop(observers);
-        Ok(Finished { world, traces, gates })
-    }
-
-    /// What the first lane draws at that moment, after all frames before it.
-    pub(super) fn drawn_in(
-        &self,
-        world: &World,
-        moment: Moment,
-        bar: &ProgressBar,
-    ) -> Result<Vec<PartId>, CliError> {
-        let stage = world.stage();
-        let staged = self.oracles.stage(&stage, world.scene.seed)?;
-        let entries = world.entries();
-        let mut seen = DrawnAt(moment, Vec::new());
-        let oracle = staged.make(&staged.names[0])?;
-        let info = LaneInfo::of(self.cullers[0].name, oracle.as_ref(), String::new());
-        let culler = self.factory(self.cullers[0], world, &entries);
-        let lane = Lane { info, culler, oracle, observer: &mut seen, with_bound: false };
-        let frames = moment.frame + 1;
-        bar.inc_length(u64::from(frames) * u64::from(world.views()));
-        let mut tick = || {
-            bar.inc(1);
-            !interrupted()
-        };
-        run_lanes(world, frames, Repeat::NONE, &mut [lane], &mut tick)?;
-        Ok(seen.1)
-    }
-
-    /// Lends the first lane's culler and oracle, new ones, to `work`.
-    pub(super) fn with_lane<T>(
-        &self,
-        world: &World,
-        work: impl FnOnce(&mut dyn Culler, &mut dyn Oracle) -> Result<T, RunError>,
-    ) -> Result<T, CliError> {
-        let stage = world.stage();
-        let staged = self.oracles.stage(&stage, world.scene.seed)?;
-        let mut oracle = staged.make(&staged.names[0])?;
-        let entries = world.entries();
-        let mut culler = self.factory(self.cullers[0], world, &entries)();
-        Ok(work(culler.as_mut(), oracle.as_mut())?)
-    }
-
-    fn factory<'a>(
-        &'a self,
-        kind: CullerKind,
-        world: &'a World,
-        entries: &'a [Entry],
-    ) -> Box<dyn Fn() -> Box<dyn Culler> + 'a> {
-        Box::new(move || {
-            PerView::over(world.views(), || {
-                (kind.make)(CullerSetup {
-                    partition: world.partition.clone(),
-                    index: (self.index.build)(entries),
-                    proxy: self.args.proxy.into(),
-                    cost: self.cost.clone(),
-                })
-            })
-        })
-    }
-
-    fn replay_line(&self, name: &str, world: &World, culler: &str, oracle: &str) -> String {
-        format!(
-            "plainsight replay --scene {} --seed {} --frames {} --culler {culler} --oracle {oracle}{}",
-            quoted(name),
-            world.scene.seed,
-            world.scene.frames,
-            self.args.replay_flags()
-        )
-    }
-}
-
-/// What a run came to so far.
+/// What a run came to so far: all that was finished is in it.
 #[derive(Default)]
 struct Told {
     rows: Vec<Row>,
-    cases: Vec<JunitCase>,
-    failed: bool,
-    /// The scene at hand.
-    scene: Option<String>,
+    ruling: Ruling,
+    /// A lane each; the watchdog has them as well.
+    cases: Arc<Mutex<Vec<JunitCase>>>,
+}
+
+/// Locks the cases: they are whole at every moment, also after a panic elsewhere.
+fn locked(cases: &Mutex<Vec<JunitCase>>) -> MutexGuard<'_, Vec<JunitCase>> {
+    cases.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends the outputs of a run in which a lane hangs.
+fn keep_at_hang(hung: &Hung, cases: &Mutex<Vec<JunitCase>>, out: &AtHang, junit_file: &AtHang) {
+    let line = json!({
+        "schema": JSON_SCHEMA,
+        "scene": hung.scene,
+        "seed": hung.seed,
+        "culler": hung.culler,
+        "oracle": hung.oracle,
+        "verdict": Ruling::Failed.word(),
+        "failures": hung.failures,
+    });
+    out.finish(format!("{line}\n").as_bytes());
+    let mut cases = locked(cases);
+    cases.push(JunitCase {
+        scene: hung.scene.clone(),
+        name: format!("{}@{}", hung.culler, hung.oracle),
+        seconds: hung.seconds,
+        end: JunitEnd::Failure,
+        failures: hung.lines(),
+    });
+    junit_file.finish(junit(&cases).as_bytes());
+}
+
+/// The line that runs a scene's lanes again.
+fn run_line(args: &RunArgs, plan: &Plan<'_>, scene: &Named) -> String {
+    let mut line = format!("plainsight run --scene {}", quoted(scene.name()));
+    for (name, values) in [("culler", &args.culler), ("oracle", &args.oracle)] {
+        if !values.is_empty() {
+            line += &format!(" --{name} {}", quoted(&values.join(",")));
+        }
+    }
+    line + &plan.args.replay_flags(scene.scene()) + &plan.repeat.replay_flags()
 }
 
 pub(super) fn run(
@@ -449,14 +81,19 @@ pub(super) fn run(
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
     let junit_file = args.junit.as_deref().map(|path| outputs.file("--junit", path)).transpose()?;
+    let mut junit_file = SharedFile::new(junit_file);
     let mut told = Told::default();
-    let code = run_scenes(args, cullers, &mut told, outputs, streams);
-    let Some(file) = junit_file else { return code };
+    // A panic leaves the file as well.
+    let code =
+        caught(|| run_scenes(args, cullers, (&mut told, &junit_file.at_hang()), outputs, streams))
+            .unwrap_or_else(|said| {
+                Err(CliError::Panicked { place: format!("replay: {}", outputs.again()), said })
+            });
+    let mut cases = locked(&told.cases);
     if let Err(error) = &code {
-        let scene = told.scene.as_deref().unwrap_or("plainsight");
-        told.cases.push(error_case(scene, "run", error, outputs.again()));
+        cases.push(error_case("plainsight", "run", error, outputs.again()));
     }
-    let written = file.finish(junit(&told.cases).as_bytes());
+    let written = junit_file.finish(junit(&cases).as_bytes());
     code.and_then(|code| written.map(|()| code))
 }
 
@@ -464,11 +101,12 @@ pub(super) fn run(
 fn run_scenes(
     args: &RunArgs,
     cullers: &[CullerKind],
-    told: &mut Told,
+    (told, junit_file): (&mut Told, &AtHang),
     outputs: &mut Outputs<'_>,
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
-    let mut out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
+    let out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
+    let mut out = SharedFile::new(out);
     let names: Vec<&str> = if args.scene.is_empty() {
         DEFAULT_SCENES.to_vec()
     } else {
@@ -492,30 +130,22 @@ fn run_scenes(
         cache: pick_cache(&scene_args)?,
         oracles: Oracles::open(&args.oracle, adapter, streams)?.simulating(&cost, &scene_args),
         cost,
-        repeat: REPEAT,
+        repeat: args.repeat,
         with_bound: false,
         args: &scene_args,
     };
     catch_interrupt();
     let bar = progress_bar();
-    let ended = scenes.iter().try_for_each(|named| {
-        told.scene = Some(named.name.clone());
-        let finished = plan.run(named, &bar, streams)?;
-        let difference = partition_difference(&finished.world);
-        for (trace, gate) in finished.traces.iter().zip(&finished.gates) {
-            let row = Row::new(&finished.world, trace, gate, difference);
-            let line = serde_json::to_string(&row).expect("a row is plain data");
-            if args.json {
-                bar.suspend(|| writeln!(streams.out, "{line}"))?;
-            }
-            out.as_mut().map_or(Ok(()), |out| bar.suspend(|| out.line(&line)))?;
-            told.cases.push(junit_case(&row, failure_lines(gate, trace)));
-            told.rows.push(row);
-            told.failed |= !gate.held();
-            bar.suspend(|| tell_failures(gate, trace, streams))?;
-        }
-        Ok::<(), CliError>(())
+    let (cases, at_out, at_junit) = (Arc::clone(&told.cases), out.at_hang(), junit_file.clone());
+    let watchdog = Watchdog::start(&scene_args.frame_limit, move |hung| {
+        keep_at_hang(hung, &cases, &at_out, &at_junit);
     });
+    let ended = scenes.iter().try_for_each(|named| {
+        let finished = plan.run(named, &bar, streams).map_err(|error| (Some(named), error))?;
+        bar.suspend(|| tell_scene(args, &finished, told, &mut out, streams))
+            .map_err(|error| (None, error))
+    });
+    drop(watchdog);
     bar.finish_and_clear();
     if !args.json {
         let cut = args.scene.is_empty() && args.scene_args.frames.is_none();
@@ -527,10 +157,45 @@ fn run_scenes(
         }
     }
     // What stood there before stays where nothing was finished.
-    if let Some(out) = out.filter(|_| ended.is_ok() || !told.rows.is_empty()) {
+    if ended.is_ok() || !told.rows.is_empty() {
         out.finish(&[])?;
     }
-    ended.map(|()| if told.failed { EXIT_FAILED } else { EXIT_HELD })
+    let Err((scene, error)) = ended else { return Ok(exit_of(told.ruling)) };
+    if let Some(scene) = scene {
+        let replay = run_line(args, &plan, scene);
+        writeln!(streams.talk, "replay: {replay}")?;
+        locked(&told.cases).push(error_case(scene.name(), "all lanes", &error, &replay));
+    }
+    // What failed before is worse than how the run ended.
+    if told.ruling == Ruling::Failed {
+        writeln!(streams.talk, "plainsight: {error}")?;
+        return Ok(EXIT_FAILED);
+    }
+    Err(error)
+}
+
+/// A scene's lanes: their rows, cases and failures.
+fn tell_scene(
+    args: &RunArgs,
+    finished: &Finished,
+    told: &mut Told,
+    out: &mut SharedFile<'_>,
+    streams: &mut Streams<'_>,
+) -> Result<(), CliError> {
+    told.ruling = told.ruling.max(finished.ruling());
+    let difference = partition_difference(&finished.world);
+    for (gate, trace, why) in finished.lanes() {
+        let row = Row::new(&finished.world, trace, gate, difference);
+        let line = serde_json::to_string(&row).expect("a row is plain data");
+        if args.json {
+            writeln!(streams.out, "{line}")?;
+        }
+        out.line(&line)?;
+        locked(&told.cases).push(junit_case(&row, gate.ruling(), failure_lines(gate, trace)));
+        told.rows.push(row);
+        tell_failures((gate, trace, why), streams)?;
+    }
+    Ok(())
 }
 
 fn tell_table(rows: &[Row], cut: bool, streams: &mut Streams<'_>) -> Result<(), CliError> {
@@ -570,55 +235,12 @@ fn tell_table(rows: &[Row], cut: bool, streams: &mut Streams<'_>) -> Result<(), 
             "frames: cut to {DEFAULT_RUN_FRAMES} of 24 to answer within a minute; --frames 24 runs them all"
         )?;
     }
-    let held = rows.iter().filter(|row| row.verdict != "failed").count();
-    let word = if held == rows.len() { "held" } else { "FAILED" };
+    let held = rows.iter().filter(|row| row.ruling() == Ruling::Held).count();
+    let word = loud(rows.iter().map(Row::ruling).max().unwrap_or_default());
     writeln!(
         streams.out,
         "verdict: {word} ({held} of {} lanes held; figures per frame)",
         rows.len()
     )?;
     Ok(())
-}
-
-/// What failed, and the line that replays it.
-pub(super) fn tell_failures(
-    gate: &Gate,
-    trace: &Trace,
-    streams: &mut Streams<'_>,
-) -> std::io::Result<()> {
-    if !gate.held() {
-        let lane = &trace.lane;
-        writeln!(streams.talk, "FAILED: {} on {}", lane.culler, lane.oracle)?;
-        gate.failures().iter().try_for_each(|line| writeln!(streams.talk, "  {line}"))?;
-        writeln!(streams.talk, "  replay: {} --expect {:016x}", lane.replay, trace.hash())?;
-        let lane = lane.replay.strip_prefix("plainsight replay ");
-        if let (Some(lane), Some(miss)) = (lane, gate.conservative.misses().first()) {
-            let Moment { frame, view } = miss.moment;
-            let view = if view > 0 { format!(" --view {view}") } else { String::new() };
-            let part = miss.part.0;
-            writeln!(
-                streams.talk,
-                "  why: plainsight why {lane} --frame {frame}{view} --part {part}"
-            )?;
-        }
-    }
-    Ok(())
-}
-
-/// The plan for one culler and one oracle on one scene.
-pub(super) fn one_lane<'a>(
-    (scene, culler, oracle): (&str, &String, &String),
-    args: &'a SceneArgs,
-    cullers: &[CullerKind],
-    streams: &mut Streams<'_>,
-) -> Result<(Plan<'a>, Named), CliError> {
-    let oracle = std::slice::from_ref(oracle);
-    let chosen = pick_cullers(std::slice::from_ref(culler), cullers)?;
-    let index = pick_index(&args.index)?;
-    Oracles::known(oracle)?;
-    let named = Named::open(scene, args)?;
-    let (cost, cache) = (pick_cost(args)?, pick_cache(args)?);
-    let oracles = Oracles::open(oracle, args.adapter.as_deref(), streams)?.simulating(&cost, args);
-    let (cullers, repeat) = (chosen, REPEAT);
-    Ok((Plan { cullers, index, oracles, cost, cache, repeat, with_bound: false, args }, named))
 }

@@ -1,7 +1,8 @@
 //! `stress`: worlds by the thousand, each picked by its seed, each judged by every check.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::io::Write;
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -13,16 +14,19 @@ use super::files::Files;
 use super::merge::{self, Merged, merged};
 use super::out_file::OutFolder;
 use super::progress::progress_bar;
-use super::run::{Oracles, pick_cullers};
+use super::run::{Oracles, exit_of, pick_cullers};
 use super::signals::{catch_interrupt, interrupted};
+use super::watchdog::{FrameLimit, Hung, SharedFile, Watchdog};
 use super::{CliError, EXIT_FAILED, EXIT_HELD, EXIT_USAGE, Outputs, Streams};
-use crate::cull::{Culler, CullerKind, CullerSetup, Pen, View};
+use crate::check::{Check, Ruling};
+use crate::cull::{Culler, CullerKind, CullerSetup, DrawAll, Pen, View};
 use crate::oracle::{Oracle, OracleError, Questions, Stage};
 use crate::report::{difference_picture, picture_png};
-use crate::run::{FrameState, RunError, Truth, render};
-use crate::scene::{Scene, to_toml};
+use crate::run::{Canary, FrameState, RunError, Truth, caught, render};
+use crate::scene::{Scene, Viewport, to_toml};
 use crate::stress::{
-    Choice, Judged, Outcome, Shard, Shrunk, Tally, judged, judged_in, seed_of, shrink, size,
+    Choice, Device, Judged, Outcome, REPEATED_ONE_IN, Shard, Shrunk, Tally, judged, judged_in,
+    seed_of, shrink, size,
 };
 
 /// Seeds of a sweep where nothing is said.
@@ -82,6 +86,11 @@ pub(super) struct StressArgs {
     /// line as it comes, and the summary goes to standard error.
     #[arg(long, value_name = "FILE|-")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    frame_limit: FrameLimit,
+    /// Makes every world wrong on purpose, to see that the failure arrives; see `run --canary`.
+    #[arg(long, value_name = "CHECK")]
+    canary: Option<Canary>,
 }
 
 impl StressArgs {
@@ -103,6 +112,10 @@ impl StressArgs {
         add("culler", &self.culler);
         add("oracle", &self.oracle);
         add("adapter", self.adapter.as_slice());
+        add(
+            "canary",
+            &self.canary.map(|canary| canary.to_string()).into_iter().collect::<Vec<_>>(),
+        );
         flags
     }
 }
@@ -138,6 +151,8 @@ enum End {
     Time,
     /// A signal.
     Interrupted,
+    /// The device.
+    Lost,
 }
 
 /// A sweep over seeds.
@@ -146,6 +161,18 @@ struct Sweep<'a> {
     cullers: Vec<CullerKind>,
     real: Vec<Questions>,
     oracles: Oracles,
+    /// What became of worlds of the chunk at hand, for a watchdog that ends the sweep.
+    done: Arc<Mutex<Vec<Outcome>>>,
+}
+
+/// Locks outcomes: the list is whole at every moment, also after a panic elsewhere.
+fn locked(done: &Mutex<Vec<Outcome>>) -> MutexGuard<'_, Vec<Outcome>> {
+    done.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What a seed picks among these cullers and devices.
+fn choice(args: &StressArgs, seed: u64, cullers: &[CullerKind], real: &[Questions]) -> Choice {
+    Choice { canary: args.canary, ..Choice::of(seed, cullers, real) }
 }
 
 impl Sweep<'_> {
@@ -154,23 +181,22 @@ impl Sweep<'_> {
         self.oracles.stage(stage, 0)?.make(questions.name())
     }
 
-    /// The world of a seed; a panic in it is a failure like any other.
-    fn world(&self, seed: u64) -> Result<Outcome, RunError> {
-        let choice = Choice::of(seed, &self.cullers, &self.real);
+    /// The world of a choice; a panic in it, and a device that is not there, are outcomes like any other.
+    fn judged(&self, choice: &Choice) -> Outcome {
         let real = |stage: &Stage, questions| self.real(stage, questions);
-        catch_unwind(AssertUnwindSafe(|| judged(&choice, &real))).unwrap_or_else(|panic| {
-            let said = panic
-                .downcast_ref::<String>()
-                .map(String::as_str)
-                .or_else(|| panic.downcast_ref::<&str>().copied())
-                .unwrap_or("without a word");
-            let said = said.lines().next().unwrap_or("");
-            Ok(Outcome::panicked(&choice, said))
-        })
+        match caught(|| judged(choice, &real)) {
+            Ok(Ok(outcome)) => outcome,
+            Ok(Err(error)) => Outcome::unrun(choice, Check::Lost, &error.to_string()),
+            Err(said) => Outcome::unrun(choice, Check::Panic, &said),
+        }
     }
 
-    fn replay(&self, seed: u64) -> String {
-        format!("plainsight stress --seed {seed}{}", self.args.flags())
+    /// The world of a seed.
+    fn world(&self, seed: u64) -> Outcome {
+        let outcome = self.judged(&choice(self.args, seed, &self.cullers, &self.real));
+        let outcome = Outcome { replay: replay(self.args, seed), ..outcome };
+        locked(&self.done).push(outcome.clone());
+        outcome
     }
 
     /// Runs the seeds in order, chunk by chunk, until they, the time or the user's patience end.
@@ -196,15 +222,17 @@ impl Sweep<'_> {
             }
             // A signal does not wait for the worlds that are still to come.
             let world = |&seed: &u64| (!interrupted()).then(|| self.world(seed));
-            let outcomes: Vec<Option<Result<Outcome, RunError>>> = match self.real.is_empty() {
+            let outcomes: Vec<Option<Outcome>> = match self.real.is_empty() {
                 true => chunk.par_iter().map(world).collect(),
                 false => chunk.iter().map(world).collect(),
             };
+            locked(&self.done).clear();
             for outcome in outcomes.into_iter().flatten() {
-                let outcome = outcome?;
-                let replay = self.replay(outcome.seed);
-                each(&Outcome { replay, ..outcome })?;
+                each(&outcome)?;
                 bar.inc(1);
+                if outcome.ruling() == Ruling::Lost {
+                    return Ok(End::Lost);
+                }
             }
         }
     }
@@ -216,16 +244,16 @@ impl Sweep<'_> {
         &self,
         seed: u64,
         (folder, outputs): (&OutFolder, &mut Outputs<'_>),
-        to: &mut dyn std::io::Write,
+        to: &mut dyn Write,
     ) -> Result<(), CliError> {
-        let mut choice = Choice::of(seed, &self.cullers, &self.real);
+        let mut choice = choice(self.args, seed, &self.cullers, &self.real);
         let real = |stage: &Stage, questions| self.real(stage, questions);
         let scene = choice.scene()?;
         let start = Instant::now();
         let first_failure = |choice: &Choice, scene: &Scene| {
             let late = start.elapsed() >= SHRINK_TIME || interrupted();
             let run = || judged_in(choice, scene.clone(), &real);
-            match (late, catch_unwind(AssertUnwindSafe(run))) {
+            match (late, caught(run)) {
                 (true, _) => None,
                 (false, Ok(judged)) => judged.ok().and_then(|judged| judged.outcome.failed_in),
                 // A panic comes no earlier than it comes.
@@ -262,7 +290,7 @@ impl Sweep<'_> {
             start.elapsed().as_secs_f64(),
             file.display()
         )?;
-        let judged = catch_unwind(AssertUnwindSafe(|| judged_in(&choice, small, &real)));
+        let judged = caught(|| judged_in(&choice, small, &real));
         if let Ok(Ok(Judged { outcome, world, wrong: Some((moment, drawn)) })) = judged {
             let state = FrameState::at(&world, moment);
             let truth = Truth::of(&world, &state);
@@ -277,12 +305,16 @@ impl Sweep<'_> {
         }
         let file = quoted(&file.display().to_string());
         match choice.policy {
-            None => writeln!(to, "  replay: plainsight run --scene {file}{}", choice.flags())?,
+            None => {
+                // What was run twice may be what failed.
+                let twice = if seed.is_multiple_of(REPEATED_ONE_IN) { " --rounds 2" } else { "" };
+                writeln!(to, "  replay: plainsight run --scene {file}{}{twice}", choice.flags())?;
+            }
             // The scene file stands alone, but no flag of `run` sets a policy of `full`.
             Some(_) => writeln!(
                 to,
                 "  replay: {} (fails by the policy of full alone, for which run has no flags)",
-                self.replay(seed)
+                replay(self.args, seed)
             )?,
         }
         Ok(())
@@ -302,25 +334,68 @@ impl Culler for Blind {
     }
 }
 
-/// Worlds that must fail, and do if failures are reported at all: a culler that draws nothing, where
-/// something shows. The first seeds in which nothing shows prove nothing and are passed over.
-fn canary() -> Result<bool, CliError> {
-    let make = |_: CullerSetup| Box::new(Blind) as Box<dyn Culler>;
-    let blind = CullerKind { name: "blind", summary: "draws nothing", asks: false, make };
-    for seed in 0..CANARIES {
-        let choice = Choice::of(seed, &[blind], &[]);
-        let outcome = judged(&choice, &|_, _| unreachable!("no real device is named"))?;
-        if outcome.visible > 0 {
-            return Ok(!outcome.failures.is_empty());
+/// The line that runs a seed again.
+fn replay(args: &StressArgs, seed: u64) -> String {
+    format!("plainsight stress --seed {seed}{}{}", args.flags(), args.frame_limit.replay_flags())
+}
+
+/// What must come of each canary but those that hang or look like others.
+const CANARY_RULINGS: [(Canary, Check); 10] = [
+    (Canary::Set, Check::Set),
+    (Canary::Image, Check::Image),
+    (Canary::DeviceImage, Check::DeviceImage),
+    (Canary::Determinism, Check::Determinism),
+    (Canary::Counts, Check::Counts),
+    (Canary::Truth, Check::Truth),
+    (Canary::Panic, Check::Panic),
+    (Canary::Unrepeatable, Check::Repeatable),
+    (Canary::Lost, Check::Lost),
+    (Canary::SetThenLost, Check::Set),
+];
+
+impl Sweep<'_> {
+    /// Runs worlds that must fail, and do if failures are reported at all: a culler that draws nothing, where
+    /// something shows, and one for each check, that is wrong in one way only. Each goes where the sweep's own
+    /// worlds go, up to the exit code. Says the first that was not reported.
+    fn silent_canary(&self) -> Result<Option<String>, CliError> {
+        let blind = |_: CullerSetup| Box::new(Blind) as Box<dyn Culler>;
+        let whole = |setup: CullerSetup| Box::new(DrawAll::new(setup)) as Box<dyn Culler>;
+        let kind = |name, make| CullerKind { name, summary: "", asks: false, make };
+        // Small, plain, and so that something shows: seeds in which nothing does prove nothing.
+        let plain = |seed: u64, culler: CullerKind| Choice {
+            frames: 3,
+            viewport: Viewport { width: 97, height: 61 },
+            device: Device::Sim,
+            ..Choice::of(seed, &[culler], &[])
+        };
+        let seed = (0..CANARIES)
+            .find(|&seed| self.judged(&plain(seed, kind("blind", blind))).visible > 0)
+            .ok_or_else(|| CliError::Usage("no world of the swarm shows anything".to_owned()))?;
+        let own = |(canary, check): (Canary, Check)| {
+            let choice = Choice { canary: Some(canary), ..plain(seed, kind("whole", whole)) };
+            (format!("one wrong by '{canary}'"), choice, check)
+        };
+        let blind = plain(seed, kind("blind", blind));
+        let blind = ("a culler that draws nothing".to_owned(), blind, Check::Set);
+        for (name, choice, check) in [blind].into_iter().chain(CANARY_RULINGS.map(own)) {
+            let outcome = self.judged(&choice);
+            let named = format!("{}: ", check.name());
+            let said = outcome.failures.iter().any(|line| line.starts_with(&named));
+            let mut tally = Tally::default();
+            tally.add(&outcome);
+            let code = conclude((false, false), &tally, &[], &mut std::io::sink())?;
+            if !said || code != exit_of(check.ruling()) {
+                return Ok(Some(name));
+            }
         }
+        Ok(None)
     }
-    Ok(false)
 }
 
 /// Adds up what others ran.
 fn merge_files(args: &StressArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
     let Merged { tally, missing } = merged(&args.merge)?;
-    let code = conclude(args, &tally, &missing, streams.out)?;
+    let code = conclude((args.every_probe, args.partial), &tally, &missing, streams.out)?;
     Ok(if code == EXIT_HELD && !missing.is_empty() && !args.partial { EXIT_USAGE } else { code })
 }
 
@@ -333,7 +408,8 @@ pub(super) fn stress(
     if !args.merge.is_empty() {
         return merge_files(args, streams);
     }
-    let mut out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
+    let out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
+    let mut out = SharedFile::new(out);
     let folder = args.shrink.as_deref().map(|path| outputs.folder("--shrink", path)).transpose()?;
     let (sweep, whole, shard) = chosen(args, cullers, streams)?;
     catch_interrupt();
@@ -345,35 +421,34 @@ pub(super) fn stress(
         .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
     bar.set_length((whole.last - whole.first) / shard.count + 1);
-    if !canary()? {
-        writeln!(streams.out, "FAILED: the canary, a culler that draws nothing, was not reported")?;
+    let watchdog = sweep.watched(&whole, &out);
+    if let Some(canary) = sweep.silent_canary()? {
+        writeln!(streams.out, "FAILED: the canary, {canary}, was not reported")?;
         return Ok(EXIT_FAILED);
     }
     let (mut tally, start) = (Tally::default(), Instant::now());
     let own = (whole.first..=whole.last).skip(shard.index as usize).step_by(shard.count as usize);
     let ran = sweep.run(own, &bar, &mut |outcome| {
         tally.add(outcome);
-        if !outcome.failures.is_empty() {
+        if tally.failed > 0 {
             bar.set_message(format!("{} FAILED", tally.failed));
         }
         let line = whole.line(outcome);
         if args.json {
             bar.suspend(|| writeln!(streams.out, "{line}"))?;
         }
-        if let Some(out) = &mut out {
-            bar.suspend(|| out.line(&line))?;
-        }
-        Ok(())
+        bar.suspend(|| out.line(&line))
     });
+    drop(watchdog);
     bar.finish_and_clear();
     // Whatever ended it, what was run is kept.
-    if let Some(out) = out.filter(|_| tally.worlds > 0) {
+    if tally.worlds > 0 {
         out.finish(&[])?;
     }
     let end = ran?;
     let seconds = start.elapsed().as_secs_f64();
     let to_talk = &mut *streams.talk;
-    let sink: &mut dyn std::io::Write = if args.json { to_talk } else { &mut *streams.out };
+    let sink: &mut dyn Write = if args.json { to_talk } else { &mut *streams.out };
     let rest = match end {
         End::Interrupted if tally.worlds == 0 => return Err(RunError::Interrupted.into()),
         End::Time if tally.worlds == 0 => {
@@ -383,6 +458,7 @@ pub(super) fn stress(
         End::Seeds => "",
         End::Time => "; the time was up before all seeds were run",
         End::Interrupted => "; interrupted",
+        End::Lost => "; the device was lost",
     };
     writeln!(
         sink,
@@ -396,11 +472,12 @@ pub(super) fn stress(
     {
         writeln!(sink, "seed {}: {}; {}", only.seed, only.scene, only.options)?;
     }
-    let code = conclude(args, &tally, &[], sink)?;
+    let code = conclude((args.every_probe, false), &tally, &[], sink)?;
     if end == End::Interrupted {
         return Err(RunError::Interrupted.into());
     }
-    if let (Some(folder), Some(failure)) = (&folder, tally.failures.first()) {
+    let failure = tally.failures.first().filter(|outcome| outcome.ruling() == Ruling::Failed);
+    if let (Some(folder), Some(failure)) = (&folder, failure) {
         sweep.shrink(failure.seed, (folder, outputs), sink)?;
     }
     Ok(code)
@@ -445,15 +522,40 @@ fn chosen<'a>(
     let oracles = Oracles::open(&names, adapter, streams)?;
     let flags = args.flags().trim_start().to_owned();
     let whole = merge::Sweep { flags, first, last, shards: shard.count, shard: shard.index };
-    Ok((Sweep { args, cullers, real, oracles }, whole, shard))
+    Ok((Sweep { args, cullers, real, oracles, done: Arc::default() }, whole, shard))
+}
+
+impl Sweep<'_> {
+    /// A watchdog over the sweep: where a world hangs, the lines of the others are kept, with its own.
+    fn watched(&self, whole: &merge::Sweep, out: &SharedFile<'_>) -> Watchdog {
+        let (args, cullers, real) = (self.args.clone(), self.cullers.clone(), self.real.clone());
+        let (done, whole, out) = (Arc::clone(&self.done), whole.clone(), out.at_hang());
+        let keep = move |hung: &mut Hung| {
+            hung.replay = replay(&args, hung.seed);
+            let choice = choice(&args, hung.seed, &cullers, &real);
+            let failures = hung.failures.clone();
+            let own = Outcome::unrun(&choice, Check::Hang, "");
+            let own = Outcome { failures, replay: hung.replay.clone(), ..own };
+            let mut outcomes = locked(&done).clone();
+            outcomes.sort_by_key(|outcome| outcome.seed);
+            let lines = outcomes.iter().chain([&own]).map(|outcome| whole.line(outcome) + "\n");
+            let lines: String = lines.collect();
+            if args.json {
+                // The process ends as failed in any case.
+                let _ = std::io::stdout().write_all(lines.as_bytes());
+            }
+            out.finish(lines.as_bytes());
+        };
+        Watchdog::start(&self.args.frame_limit, keep)
+    }
 }
 
 /// What a sweep came to.
 fn conclude(
-    args: &StressArgs,
+    (every_probe, partial): (bool, bool),
     tally: &Tally,
     missing: &[String],
-    to: &mut dyn std::io::Write,
+    to: &mut dyn Write,
 ) -> Result<u8, CliError> {
     writeln!(
         to,
@@ -484,27 +586,27 @@ fn conclude(
     })?;
     worst("most questions", &tally.most_queries, &|o| a_frame(o.queries, o))?;
     for failure in tally.failures.iter().take(SAID_FAILURES) {
-        writeln!(to, "FAILED: seed {}: {}; {}", failure.seed, failure.scene, failure.options)?;
+        let word = failure.ruling().word().to_uppercase();
+        writeln!(to, "{word}: seed {}: {}; {}", failure.seed, failure.scene, failure.options)?;
         failure.failures.iter().try_for_each(|line| writeln!(to, "  {line}"))?;
         writeln!(to, "  replay: {}", failure.replay)?;
     }
     let never = tally.never_reached();
-    if args.every_probe {
+    if every_probe {
         never.iter().try_for_each(|probe| writeln!(to, "NEVER REACHED: {probe}"))?;
     }
     missing.iter().try_for_each(|what| writeln!(to, "MISSING: {what}"))?;
-    let held = tally.failed == 0 && (never.is_empty() || !args.every_probe);
-    let word = match (held, missing) {
-        (false, _) => "failed",
-        (true, []) => "held",
-        (true, _) if args.partial => "held as far as it goes",
-        (true, _) => "incomplete; --partial judges what is there",
+    let ruling = if every_probe && !never.is_empty() { Ruling::Failed } else { tally.ruling };
+    let word = match (ruling, missing) {
+        (Ruling::Held, [_, ..]) if partial => "held as far as it goes",
+        (Ruling::Held, [_, ..]) => "incomplete; --partial judges what is there",
+        (ruling, _) => ruling.word(),
     };
     writeln!(
         to,
         "verdict: {word} ({} of {} worlds held)",
-        tally.worlds - tally.failed,
+        tally.worlds - tally.failed - tally.device_at_fault,
         tally.worlds
     )?;
-    Ok(if held { EXIT_HELD } else { EXIT_FAILED })
+    Ok(exit_of(ruling))
 }

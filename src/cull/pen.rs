@@ -1,8 +1,7 @@
 //! The pen: what a culler draws and asks with. It hands everything on to the oracle and keeps the
 //! record that the trace is made of.
 
-use std::fmt;
-
+use super::event::{self, Event};
 use super::{Item, Journal, Question, Situation, Situations};
 use crate::oracle::{Amounts, Answer, Oracle, OracleError, Proxy, QueryId};
 use crate::part::{PartId, Partition};
@@ -15,8 +14,7 @@ pub struct Counts {
     /// Proxies in all questions; more than questions where some were asked about together.
     pub proxies: u64,
     /// Samples of all rectangles asked about; one within two rectangles counts twice. A hull counts its
-    /// area, a box none: what it covers is known to the oracle alone. In no hash: rectangles and hulls
-    /// are.
+    /// area, a box none: what it covers is known to the oracle alone. In no hash: the proxies are.
     pub pixels: u64,
     /// Triangles of the parts drawn.
     pub triangles: u64,
@@ -40,35 +38,6 @@ impl Counts {
         }
     }
 }
-
-/// Something that a culler did, or was told, in a frame: what its hash is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Event {
-    kind: u8,
-    value: u64,
-}
-
-impl fmt::Display for Event {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { kind, value } = *self;
-        match kind {
-            DRAW => write!(f, "draw of part {value}"),
-            ASK => write!(f, "question {value}"),
-            ANSWER => {
-                let word = if value & 1 == 1 { "visible" } else { "hidden" };
-                write!(f, "answer \"{word}\" to question {}", value >> 1)
-            }
-            _ => write!(f, "a proxy's place or depth, {value:#x}"),
-        }
-    }
-}
-
-/// Kinds of events.
-const DRAW: u8 = 1;
-const ASK: u8 = 2;
-const RECTANGLE: u8 = 3;
-const ANSWER: u8 = 4;
-const HULL: u8 = 5;
 
 /// Draws, asks, and remembers.
 pub struct Pen<'a> {
@@ -109,7 +78,7 @@ impl<'a> Pen<'a> {
             drawn: Vec::new(),
             already: vec![false; partition.part_count() as usize],
             counts: Counts::default(),
-            events_hash: 0xcbf2_9ce4_8422_2325,
+            events_hash: event::HASH_START,
             situations: Situations::default(),
             several: Vec::new(),
             journal: None,
@@ -147,7 +116,7 @@ impl<'a> Pen<'a> {
     /// For an id beyond the last part.
     pub fn draw(&mut self, part: PartId) {
         if !std::mem::replace(&mut self.already[part.0 as usize], true) {
-            self.note(DRAW, u64::from(part.0));
+            self.note(Event::draw(part));
             self.counts.triangles += u64::from(self.partition.part(part).triangle_count);
             self.drawn.push(part);
             self.oracle.draw_part(part);
@@ -181,22 +150,10 @@ impl<'a> Pen<'a> {
             let after_opened = journal.opened.len();
             journal.questions.push(Question { query, items, proxies, visible: None, after_opened });
         }
-        self.note(ASK, u64::from(query.0));
+        self.note(Event::ask(query));
         for proxy in proxies {
             self.counts.pixels += proxy.pixels();
-            if let Proxy::Rectangle { min, max, depth } | Proxy::Hull { min, max, depth, .. } =
-                proxy
-            {
-                self.note(RECTANGLE, u64::from(min[0]) << 32 | u64::from(min[1]));
-                self.note(RECTANGLE, u64::from(max[0]) << 32 | u64::from(max[1]));
-                self.note(RECTANGLE, u64::from(depth.to_bits()));
-            }
-            if let Proxy::Hull { hull, .. } = proxy {
-                for corner in hull.corners() {
-                    let [x, y] = corner.map(|at| u64::from(at as u32));
-                    self.note(HULL, x << 32 | y);
-                }
-            }
+            event::of_proxy(proxy, &mut |event| self.note(event));
         }
         query
     }
@@ -236,7 +193,7 @@ impl<'a> Pen<'a> {
             if !answer.visible && self.several.binary_search(&answer.query).is_ok() {
                 self.situations.insert(Situation::SeveralHidden);
             }
-            self.note(ANSWER, u64::from(answer.query.0) << 1 | u64::from(answer.visible));
+            self.note(Event::answer(*answer));
             let question = self
                 .journal
                 .as_mut()
@@ -260,14 +217,10 @@ impl<'a> Pen<'a> {
         Ok(Finished { drawn, counts, events_hash, situations, events })
     }
 
-    /// FNV-1a over whole words.
-    fn note(&mut self, kind: u8, value: u64) {
+    fn note(&mut self, event: Event) {
+        self.events_hash = event.fold_into(self.events_hash);
         if let Some(events) = &mut self.events {
-            events.push(Event { kind, value });
-        }
-        for word in [u64::from(kind), value] {
-            self.events_hash =
-                (self.events_hash ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
+            events.push(event);
         }
     }
 }

@@ -3,12 +3,14 @@
 //! alarm.
 
 use super::{Fault, Harm, Rig};
-use crate::check::Gate;
+use crate::check::{Check, Gate, Ruling};
 use crate::cull::{CullerSetup, PerView, ProxyKind};
 use crate::index::Entry;
 use crate::oracle::CostModel;
 use crate::part::PartitionKnobs;
-use crate::run::{Lane, LaneInfo, Moment, Repeat, RunError, World, partition_difference, run};
+use crate::run::{
+    Canary, Lane, LaneInfo, Moment, Repeat, RunError, World, partition_difference, run,
+};
 use crate::scene::generate::{Knobs, build};
 use crate::scene::{Scene, SceneError};
 
@@ -39,8 +41,11 @@ pub struct Evidence {
     pub queries: [u64; 2],
     /// What the gate says of the broken rig, a line each.
     pub lines: Vec<String>,
-    /// What the gate says of the sound rig: false alarms.
+    /// What the gate says of the sound rig, and of the broken one that is not its doing (the truth's, the
+    /// device's): false alarms.
     pub false_alarms: Vec<String>,
+    /// What these come to.
+    pub alarm: Ruling,
 }
 
 impl Evidence {
@@ -77,6 +82,12 @@ impl Trial {
         let make = || world(scene, seed, frames);
         let altered = fault.broken.alter.map(|alter| make().map(|world| world.altered(alter)));
         Ok(Self { world: make()?, altered: altered.transpose()? })
+    }
+
+    /// The same with the sound rig, or both where nothing of the meshes is altered, wrong on purpose.
+    #[must_use]
+    pub fn with_canary(self, canary: Option<Canary>) -> Self {
+        Self { world: self.world.with_canary(canary), ..self }
     }
 
     /// Of a fault in a scene that is at hand, cut so.
@@ -117,20 +128,24 @@ impl Trial {
     }
 
     fn evidence(&self, fault: &Fault, sound: &Gate, broken: &Gate) -> Evidence {
-        let mut checks = Vec::new();
+        let findings = broken.findings();
+        let own = |check: Check| check != Check::Truth && check.ruling() == Ruling::Failed;
+        let noticed = broken.checks().into_iter().filter(|&check| own(check));
+        let mut checks: Vec<&'static str> = noticed.map(Check::name).collect();
         let mut bad: Vec<Moment> = Vec::new();
         bad.extend(broken.conservative.misses().iter().map(|miss| miss.moment));
         bad.extend(broken.image.differences().iter().map(|difference| difference.moment));
+        bad.extend(findings.iter().filter(|f| own(f.check)).filter_map(|failure| failure.moment));
         bad.sort_unstable();
         bad.dedup();
+        let others = findings.into_iter().filter(|failure| !own(failure.check));
+        let alarms: Vec<_> = sound.findings().into_iter().chain(others).collect();
+        let alarm = alarms.iter().map(|failure| failure.check.ruling()).max().unwrap_or_default();
         let mut note = |check, noticed: bool| {
             if noticed {
                 checks.push(check);
             }
         };
-        note("set", !broken.conservative.misses().is_empty());
-        note("image", !broken.image.differences().is_empty());
-        note("determinism", broken.determinism.first_difference().is_some());
         let drawn = [sound, broken].map(|gate| gate.excess.drawn());
         let queries = [sound, broken].map(|gate| gate.counts.total().queries);
         let moments = self.world.scene.frames * self.world.views();
@@ -157,12 +172,14 @@ impl Trial {
             drawn,
             queries,
             lines,
-            false_alarms: sound.failures(),
+            false_alarms: alarms.into_iter().map(|failure| failure.line).collect(),
+            alarm,
         }
     }
 }
 
-/// What the gate says of sound rigs over `world`, a line each with the rig's name: false alarms.
+/// What the gate says of sound rigs over `world`, a line each with the rig's name: false alarms; and what
+/// they come to.
 ///
 /// # Errors
 /// [`RunError::Interrupted`] where `tick` says so.
@@ -170,12 +187,12 @@ pub fn false_alarms(
     world: &World,
     rigs: &[Rig],
     tick: &mut dyn FnMut() -> bool,
-) -> Result<Vec<String>, RunError> {
+) -> Result<(Vec<String>, Ruling), RunError> {
     let gates = gates(world, rigs, tick)?;
     let lines = rigs.iter().zip(&gates).flat_map(|(rig, gate)| {
         gate.failures().into_iter().map(|line| format!("{} {}: {line}", rig.name, world.scene.name))
     });
-    Ok(lines.collect())
+    Ok((lines.collect(), gates.iter().map(Gate::ruling).max().unwrap_or_default()))
 }
 
 /// When a rig fails first in `world`; `None` where it holds.

@@ -20,6 +20,7 @@ mod proxy_mesh;
 mod residency;
 mod sim;
 mod simulated;
+mod tie;
 #[cfg_attr(not(feature = "hardware"), path = "no_wgpu.rs")]
 pub mod wgpu;
 
@@ -42,6 +43,7 @@ use proxy_mesh::{box_proxy_triangles, hull_proxy_triangles, rectangle_triangles}
 pub use residency::{Memory, MemoryKnobs, Residency, Step, least_budget, mesh_bytes};
 pub use sim::{Sim, part_draw, part_instance};
 pub use simulated::{Clock, Latency, Misbehaviour, Schedule, Simulated, WATCHDOG_NS};
+pub use tie::Tie;
 
 /// What an oracle is told at the start of a frame.
 #[derive(Clone, Copy, Debug)]
@@ -195,7 +197,7 @@ impl Questions {
 pub const MIB: u64 = 1 << 20;
 
 /// Why an oracle could not go on.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OracleError {
     /// No device was found where one was required.

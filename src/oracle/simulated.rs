@@ -2,9 +2,11 @@
 //! Draws and questions take the time that a cost model says, batches one after the other; answers come
 //! back after a latency drawn from a seed, so that a later batch may be back before an earlier one. A
 //! [`Schedule`] says what else the device does to its user: legally, some hidden answers come back as
-//! "visible" (WebGPU promises zero or not zero, and a device may over-count); illegally, it is lost, hangs
-//! or leaves an entry unwritten. The first two end in an error, the last in "visible": WebGPU reads such an
-//! entry as zero, that is "occluded", so an oracle must know which of its entries were written.
+//! "visible" (WebGPU promises zero or not zero, and a device may over-count); illegally, it is lost, hangs,
+//! leaves an entry unwritten or answers one question otherwise than it should. The first two end in an
+//! error, the third in "visible": WebGPU reads such an entry as zero, that is "occluded", so an oracle must
+//! know which of its entries were written. The last is "visible" in the place of "hidden", once: where that
+//! is in a frame that is run twice, the device did not repeat.
 //!
 //! Counts are no part of the contract: what comes back is a boolean, as from a device that answers
 //! 1 for any sample. Everything is a function of the schedule and of what is asked, so that it replays.
@@ -58,6 +60,9 @@ pub enum Misbehaviour {
     Hangs(u32),
     /// The answer to the given question, counted from 0 over the run, is never written.
     Unwritten(u32),
+    /// A hidden answer comes back as "visible", and does not where the frame is run another time: that to the
+    /// given question, counted from 0 over the run and its repetitions.
+    Flips(u32),
 }
 
 impl Misbehaviour {
@@ -74,6 +79,7 @@ impl fmt::Display for Misbehaviour {
             Self::Lost(submit) => write!(f, "lost={submit}"),
             Self::Hangs(submit) => write!(f, "hangs={submit}"),
             Self::Unwritten(question) => write!(f, "unwritten={question}"),
+            Self::Flips(question) => write!(f, "flips={question}"),
         }
     }
 }
@@ -84,7 +90,7 @@ impl FromStr for Misbehaviour {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || {
             format!(
-                "'{text}' is none: write lost=N or hangs=N (a submit, counted from 0 over the run) or unwritten=N (a question)"
+                "'{text}' is none: write lost=N or hangs=N (a submit, counted from 0 over the run), unwritten=N or flips=N (a question)"
             )
         };
         let (kind, number) = text.split_once('=').ok_or_else(wrong)?;
@@ -93,6 +99,7 @@ impl FromStr for Misbehaviour {
             "lost" => Ok(Self::Lost(number)),
             "hangs" => Ok(Self::Hangs(number)),
             "unwritten" => Ok(Self::Unwritten(number)),
+            "flips" => Ok(Self::Flips(number)),
             _ => Err(wrong()),
         }
     }
@@ -281,6 +288,7 @@ impl Oracle for Simulated {
                 self.clock.unwritten += 1;
                 answer.visible = true;
             }
+            answer.visible |= self.schedule.misbehaviour == Some(Misbehaviour::Flips(number));
             // Drawn for every answer, so that what is drawn for the next does not depend on this one.
             let doubted = self.doubt.unit() < self.schedule.doubt;
             if doubted && !answer.visible {

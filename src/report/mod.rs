@@ -20,7 +20,7 @@ pub use accuracy::{accuracy_chart, accuracy_table, effect_table, renderer_table}
 pub use chart::{Chart, Series};
 pub use columns::wrapped;
 pub use comparison::{Comparison, Published, TABLE_1};
-pub use junit::{JunitCase, junit};
+pub use junit::{JunitCase, JunitEnd, junit};
 pub use memory::MemoryFigures;
 pub use page::{FRAME_FIGURES, Page, PageAccuracy, PageLane, PagePictures, PageScene, PageSweep};
 pub use picture::{

@@ -7,6 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::json;
 
 use super::drawing::escaped;
+use crate::check::Ruling;
 
 /// Names of the figures of a lane's frame, in the order of [`PageLane::frames`].
 pub const FRAME_FIGURES: [&str; 6] =
@@ -26,6 +27,8 @@ pub struct PageLane {
     pub culler: String,
     /// The oracle's, with the device where there is one.
     pub oracle: String,
+    /// What the gate says.
+    pub ruling: Ruling,
     /// What failed, a line each; empty where all held.
     pub failures: Vec<String>,
     /// The line that replays it.
@@ -65,8 +68,8 @@ pub struct PageScene {
 pub struct PageSweep {
     /// What it came to, a line.
     pub line: String,
-    /// Whether a world failed.
-    pub failed: bool,
+    /// What the worst of its worlds came to.
+    pub ruling: Ruling,
     /// Situations, with how many worlds reached each.
     pub situations: Vec<(String, u64)>,
     /// Worst seeds: why they are here, the seed, what it picked, the line that runs it.
@@ -109,8 +112,11 @@ fn figure(value: f64) -> String {
     if value.fract() == 0.0 { format!("{value:.0}") } else { format!("{value:.2}") }
 }
 
-fn word(failed: bool) -> &'static str {
-    if failed { "<span class=\"failed\">FAILED</span>" } else { "<span class=\"held\">held</span>" }
+fn word(ruling: Ruling) -> String {
+    match ruling {
+        Ruling::Held => "<span class=\"held\">held</span>".to_owned(),
+        worse => format!("<span class=\"failed\">{}</span>", worse.word().to_uppercase()),
+    }
 }
 
 fn anchor(name: &str) -> String {
@@ -132,14 +138,14 @@ impl Page {
     #[must_use]
     pub fn held(&self) -> (usize, usize) {
         let lanes = || self.scenes.iter().flat_map(|scene| &scene.lanes);
-        (lanes().filter(|lane| lane.failures.is_empty()).count(), lanes().count())
+        (lanes().filter(|lane| lane.ruling == Ruling::Held).count(), lanes().count())
     }
 
-    /// Whether anything failed.
+    /// What the worst of all lanes and worlds came to.
     #[must_use]
-    pub fn failed(&self) -> bool {
-        let (held, lanes) = self.held();
-        held < lanes || self.sweep.as_ref().is_some_and(|sweep| sweep.failed)
+    pub fn ruling(&self) -> Ruling {
+        let lanes = self.scenes.iter().flat_map(|scene| &scene.lanes).map(|lane| lane.ruling);
+        lanes.chain(self.sweep.iter().map(|sweep| sweep.ruling)).max().unwrap_or_default()
     }
 
     /// The page as a document.
@@ -150,7 +156,7 @@ impl Page {
         body += &format!("<h1>{}</h1>\n", escaped(&self.title));
         body += &format!(
             "<p id=\"verdict\">verdict: {} ({held} of {lanes} lanes held)</p>\n<p class=\"faint\">made by <code>{}</code></p>\n",
-            word(self.failed()),
+            word(self.ruling()),
             escaped(&self.made_by)
         );
         body += &self.navigation();
@@ -194,7 +200,7 @@ impl Page {
                     escaped(&scene.name),
                     escaped(&lane.culler),
                     escaped(&lane.oracle),
-                    word(!lane.failures.is_empty()).to_owned(),
+                    word(lane.ruling),
                     figure(lane.sum(0)),
                     figure(lane.sum(1)),
                     figure(lane.sum(3)),
@@ -316,7 +322,7 @@ impl PageSweep {
     fn html(&self) -> String {
         let mut text = format!(
             "<section id=\"sweep\"><h2>Sweep over seeds</h2>\n<p>{}: {}</p>\n<h3>Worst seeds</h3>\n<div class=\"wide\"><table><thead>{}</thead><tbody>\n",
-            word(self.failed),
+            word(self.ruling),
             escaped(&self.line),
             row("th", &["why", "seed", "what it picked", "replay"].map(str::to_owned))
         );
@@ -359,6 +365,7 @@ mod tests {
         let lane = PageLane {
             culler: "a <b> culler".to_owned(),
             oracle: "sim".to_owned(),
+            ruling: if failures.is_empty() { Ruling::Held } else { Ruling::Failed },
             failures: failures.iter().map(|line| (*line).to_owned()).collect(),
             replay: "plainsight replay --x 'a & b'".to_owned(),
             frames: vec![[1.0, 2.0, 0.0, 3.0, 1.0, 0.5], [2.0, 2.0, 0.0, 3.0, 1.0, 0.25]],
@@ -388,6 +395,6 @@ mod tests {
         assert_eq!(html.matches("</script>").count(), 2, "the data's and the code's own ends");
         assert!(!html.contains("http://") && !html.contains("https://"), "nothing is loaded");
         let failed = page(&["set: frame 0 part 7"]);
-        assert!(failed.failed() && failed.html().contains("set: frame 0 part 7"));
+        assert!(failed.ruling() == Ruling::Failed && failed.html().contains("set: frame 0 part 7"));
     }
 }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::memory::{MemoryFigures, memory_table};
-use crate::check::Gate;
+use crate::check::{Gate, Ruling};
 use crate::oracle::MIB;
 use crate::run::{Trace, World};
 
@@ -67,8 +67,11 @@ pub struct Row {
     pub memory: Option<MemoryFigures>,
     /// Hash of all that must repeat, 16 hexadecimal digits.
     pub trace_hash: String,
-    /// `held`, `held late(k)` or `failed`.
+    /// `held`, `held late(k)`, `failed`, `device not repeatable` or `device lost`.
     pub verdict: String,
+    /// What the gate says where it is not held, a line each; left out where it is.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub failures: Vec<String>,
 }
 
 impl Row {
@@ -108,7 +111,14 @@ impl Row {
             memory: MemoryFigures::of(&trace.frames),
             trace_hash: format!("{:016x}", trace.hash()),
             verdict: gate.word(),
+            failures: gate.failures(),
         }
+    }
+
+    /// What the lane came to.
+    #[must_use]
+    pub fn ruling(&self) -> Ruling {
+        Ruling::of(&self.verdict).unwrap_or(Ruling::Failed)
     }
 
     /// Views of all frames.

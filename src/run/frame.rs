@@ -8,7 +8,7 @@ use glam::{DMat4, DVec3};
 use plainsight_reference::Image;
 use plainsight_reference::fast::Options;
 
-use super::Moment;
+use super::{Canary, Moment};
 use crate::cull::{ObjectView, View};
 use crate::effect;
 use crate::index::{Entry, Moves};
@@ -36,6 +36,8 @@ pub struct World {
     pub made: Made,
     /// Wall time that cutting or reading the meshes took, seconds; a figure for reports.
     pub build_seconds: f64,
+    /// What is wrong on purpose with every lane over it: for trials of the bench itself.
+    pub canary: Option<Canary>,
     effects: effect::World,
     /// By object, where it stands if no effect moves it.
     rest: Vec<Rest>,
@@ -95,8 +97,8 @@ impl World {
         let effects = effect::World::new(&scene);
         let (render, memory) = (Options::default(), None);
         let rest = Self::at_rest(&scene, &partition);
-        let (made, build_seconds) = (Made::default(), 0.0);
-        Self { scene, partition, render, memory, made, build_seconds, effects, rest }
+        let (made, build_seconds, canary) = (Made::default(), 0.0, None);
+        Self { scene, partition, render, memory, made, build_seconds, canary, effects, rest }
     }
 
     fn at_rest(scene: &Scene, partition: &Partition) -> Vec<Rest> {
@@ -110,6 +112,12 @@ impl World {
     #[must_use]
     pub fn rendered(self, render: Options) -> Self {
         Self { render, ..self }
+    }
+
+    /// With every lane wrong on purpose: for trials of the bench itself.
+    #[must_use]
+    pub fn with_canary(self, canary: Option<Canary>) -> Self {
+        Self { canary, ..self }
     }
 
     /// The same with every cut mesh altered: for trials of the bench itself.

@@ -6,9 +6,11 @@ use std::time::Instant;
 
 use plainsight_reference::Tolerance;
 
+use super::heartbeat::Pulse;
+use super::stop::attempt;
 use super::{
-    DeviceImages, FrameRecord, FrameState, FrameTrace, HASH_START, Moment, Trace, Truth, World,
-    fold,
+    Canary, Cause, DeviceImages, FrameRecord, FrameState, FrameTrace, HASH_START, Moment,
+    Repetition, Stop, Trace, Truth, World, canary, caught, fold,
 };
 use crate::cull::{Counts, Culler, Finished, Pen};
 use crate::oracle::{FrameView, Oracle, OracleError, ReadBack};
@@ -48,9 +50,17 @@ pub trait Observer {
     /// One frame, in order from 0.
     fn frame(&mut self, record: &FrameRecord<'_>);
 
-    /// A frame that was run a second time by a new culler: the traces must be equal.
-    fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
-        let _ = (first, again);
+    /// A frame that was run for another time by a new culler: the traces must be equal.
+    fn repeated(&mut self, repetition: &Repetition<'_>) {
+        let _ = repetition;
+    }
+
+    /// The lane ended early. One who does not judge may only pass a panic on.
+    ///
+    /// # Panics
+    /// With what is said of the end, where that is not kept.
+    fn stopped(&mut self, stop: &Stop) {
+        panic!("{stop}");
     }
 }
 
@@ -118,13 +128,12 @@ struct Shot {
 
 /// Runs every lane over frames `0..frames`, each view by itself, the lanes in turn within each view, then
 /// what `repeat` says, again in turn. `tick` is called after each lane's view and stops the run by
-/// returning false.
+/// returning false. A lane whose culler or oracle panics, or whose oracle gives up, ends there: its observer
+/// is told and its trace says why ([`Trace::stop`]); the others go on. A panic while the truth is drawn ends
+/// them all.
 ///
 /// # Errors
-/// [`RunError::Oracle`] where an oracle gives up, [`RunError::Interrupted`] where `tick` says so.
-///
-/// # Panics
-/// Where a culler's own invariants are broken, in builds with debug assertions.
+/// [`RunError::Interrupted`] where `tick` says so.
 pub fn run(
     world: &World,
     frames: u32,
@@ -132,35 +141,187 @@ pub fn run(
     lanes: &mut [Lane<'_>],
     tick: &mut dyn FnMut() -> bool,
 ) -> Result<Vec<Trace>, RunError> {
-    let traces = |lane: &Lane<'_>| Trace { lane: lane.info.clone(), frames: Vec::new() };
-    let mut traces: Vec<Trace> = lanes.iter().map(traces).collect();
-    let mut cullers: Vec<_> = lanes.iter().map(|lane| (lane.culler)()).collect();
-    let mut last: Option<Truth> = None;
-    for moment in Moment::all(world, frames) {
-        let state = FrameState::at(world, moment);
-        let truth = match last.take() {
-            Some(last) => last.next(world, &state),
-            None => Truth::of(world, &state),
-        };
-        let (mut everything, mut bound): (Option<ReadBack>, Option<u64>) = (None, None);
-        for ((lane, culler), trace) in lanes.iter_mut().zip(&mut cullers).zip(&mut traces) {
-            let again = repeat.rounds > 0 && moment.frame < repeat.frames;
-            let shot = shoot(world, &state, truth_facts(&truth), lane, culler.as_mut(), again)?;
-            observe(world, &state, &truth, lane, &shot, &mut everything)?;
-            let bounded = lane.info.device.is_some() && lane.with_bound && world.memory.is_none();
-            if bounded && bound.is_none() {
-                bound = Some(draw_visible(world, &state, &truth, lane.oracle.as_mut())?);
+    if world.canary == Some(Canary::DeviceImage) {
+        for lane in lanes.iter_mut() {
+            lane.info.device.get_or_insert("a canary".to_owned());
+        }
+    }
+    let traces = lanes.iter().map(|lane| lane.info.clone());
+    let traces = traces.map(|lane| Trace { lane, frames: Vec::new(), stop: None }).collect();
+    let pulse = Pulse::new(world, lanes.iter().map(|lane| &lane.info));
+    let mut running = Running { world, lanes, traces, pulse };
+    running.once(frames, repeat, tick)?;
+    running.again(repeat, tick)?;
+    Ok(running.traces)
+}
+
+/// Lanes and what they have left so far.
+struct Running<'a, 'b> {
+    world: &'a World,
+    lanes: &'a mut [Lane<'b>],
+    traces: Vec<Trace>,
+    pulse: Pulse,
+}
+
+/// The cullers of a round by lane; none where a lane has ended.
+type Cullers = Vec<Option<Box<dyn Culler>>>;
+
+impl Running<'_, '_> {
+    fn goes_on(&self, place: usize) -> bool {
+        self.traces[place].stop.is_none()
+    }
+
+    /// Ends a lane.
+    fn stop(&mut self, place: usize, moment: Option<Moment>, again: bool, cause: Cause) {
+        let stop = Stop { moment, again, cause };
+        self.lanes[place].observer.stopped(&stop);
+        self.traces[place].stop = Some(stop);
+    }
+
+    /// A new culler for every lane that goes on.
+    fn cullers(&mut self, again: bool) -> Cullers {
+        let mut cullers: Cullers = Vec::new();
+        for place in 0..self.lanes.len() {
+            let beat = self.pulse.begin(place, None);
+            let made = self.goes_on(place).then(|| attempt(|| Ok((self.lanes[place].culler)())));
+            drop(beat);
+            cullers.push(match made {
+                Some(Ok(culler)) => Some(culler),
+                Some(Err(cause)) => {
+                    self.stop(place, None, again, cause);
+                    None
+                }
+                None => None,
+            });
+        }
+        cullers
+    }
+
+    /// Every frame for the first time.
+    fn once(
+        &mut self,
+        frames: u32,
+        repeat: Repeat,
+        tick: &mut dyn FnMut() -> bool,
+    ) -> Result<(), RunError> {
+        let world = self.world;
+        let mut cullers = self.cullers(false);
+        let mut last: Option<Truth> = None;
+        for moment in Moment::all(world, frames) {
+            let seen = caught(|| {
+                let state = FrameState::at(world, moment);
+                let truth = match last.take() {
+                    Some(last) => last.next(world, &state),
+                    None => Truth::of(world, &state),
+                };
+                (state, truth)
+            });
+            let (state, truth) = match seen {
+                Ok(seen) => seen,
+                Err(said) => {
+                    let said = format!("while the truth was drawn: {said}");
+                    for place in 0..self.lanes.len() {
+                        if self.goes_on(place) {
+                            self.stop(place, Some(moment), false, Cause::Panic(said.clone()));
+                        }
+                    }
+                    return Ok(());
+                }
+            };
+            let keeps_events = repeat.rounds > 0 && moment.frame < repeat.frames;
+            let mut shared = Shared::default();
+            for place in 0..self.lanes.len() {
+                let Some(culler) = cullers[place].as_deref_mut() else { continue };
+                let (lane, pulse) = (&mut self.lanes[place], &self.pulse);
+                let done = attempt(|| {
+                    let facts = truth_facts(&truth);
+                    let beat = pulse.begin(place, Some(moment));
+                    let shot = shoot(world, &state, facts, lane, culler, keeps_events)?;
+                    drop(beat);
+                    observe(world, &state, &truth, lane, &shot, &mut shared.everything)?;
+                    let bounded =
+                        lane.info.device.is_some() && lane.with_bound && world.memory.is_none();
+                    if bounded && shared.bound.is_none() {
+                        let oracle = lane.oracle.as_mut();
+                        shared.bound = Some(draw_visible(world, &state, &truth, oracle)?);
+                    }
+                    let visible_wall_ns = shared.bound.filter(|_| bounded);
+                    Ok(FrameTrace { visible_wall_ns, ..shot.trace })
+                });
+                match done {
+                    Ok(trace) => self.traces[place].frames.push(trace),
+                    Err(cause) => {
+                        cullers[place] = None;
+                        self.stop(place, Some(moment), false, cause);
+                    }
+                }
+                if !tick() {
+                    return Err(RunError::Interrupted);
+                }
             }
-            let visible_wall_ns = bound.filter(|_| bounded);
-            trace.frames.push(FrameTrace { visible_wall_ns, ..shot.trace });
-            if !tick() {
-                return Err(RunError::Interrupted);
+            last = Some(truth);
+        }
+        Ok(())
+    }
+
+    /// What is repeated.
+    fn again(&mut self, repeat: Repeat, tick: &mut dyn FnMut() -> bool) -> Result<(), RunError> {
+        let world = self.world;
+        let run = self.traces.iter().map(|trace| trace.frames.len() as u32).max().unwrap_or(0);
+        let frames = repeat.frames.min(run / world.views());
+        let walls_of = |trace: &Trace| trace.frames.iter().map(|f| vec![f.wall_ns]).collect();
+        let mut walls: Vec<Vec<Vec<u64>>> = self.traces.iter().map(walls_of).collect();
+        let rounds = if frames > 0 { repeat.rounds } else { 0 };
+        for _ in 0..rounds {
+            let mut cullers = self.cullers(true);
+            for (shot, moment) in Moment::all(world, frames).enumerate() {
+                let state = FrameState::at(world, moment);
+                for place in 0..self.lanes.len() {
+                    let Some(culler) = cullers[place].as_deref_mut() else { continue };
+                    let (lane, pulse) = (&mut self.lanes[place], &self.pulse);
+                    let first = &self.traces[place].frames[shot];
+                    let done = attempt(|| {
+                        let facts =
+                            (first.visible_parts, first.visible_triangles, first.truth_hash);
+                        let beat = pulse.begin(place, Some(moment));
+                        let mut again = shoot(world, &state, facts, lane, culler, true)?.trace;
+                        drop(beat);
+                        canary::alter(world, &mut again);
+                        let (lane, observer) = (&lane.info, &mut *lane.observer);
+                        let (state, again) = (&state, &again);
+                        observer.repeated(&Repetition { lane, world, state, first, again });
+                        Ok(again.wall_ns)
+                    });
+                    match done {
+                        Ok(wall_ns) => walls[place][shot].push(wall_ns),
+                        Err(cause) => {
+                            cullers[place] = None;
+                            self.stop(place, Some(moment), true, cause);
+                        }
+                    }
+                    if !tick() {
+                        return Err(RunError::Interrupted);
+                    }
+                }
             }
         }
-        last = Some(truth);
+        for (trace, walls) in self.traces.iter_mut().zip(walls) {
+            for (frame, mut walls) in trace.frames.iter_mut().zip(walls) {
+                walls.sort_unstable();
+                frame.wall_ns = walls[(walls.len() - 1) / 2];
+                frame.wall_range_ns = [walls[0], walls[walls.len() - 1]];
+            }
+        }
+        Ok(())
     }
-    run_again(world, repeat, lanes, &mut traces, tick)?;
-    Ok(traces)
+}
+
+/// What lanes share within a frame: the device's picture of everything, and how long it takes for the
+/// visible parts alone.
+#[derive(Default)]
+struct Shared {
+    everything: Option<ReadBack>,
+    bound: Option<u64>,
 }
 
 /// Draws the visible parts and nothing else, the nearest objects first, and returns the wall time in
@@ -207,6 +368,7 @@ fn shoot(
     culler: &mut dyn Culler,
     keeps_events: bool,
 ) -> Result<Shot, OracleError> {
+    canary::strike(world, state.moment)?;
     let oracle = lane.oracle.as_mut();
     // Wall time is reported and never compared.
     let start = Instant::now();
@@ -268,52 +430,18 @@ fn observe(
         let all: Vec<PartId> = (0..world.partition.part_count()).map(PartId).collect();
         *everything = lane.oracle.redraw(&all)?;
     }
-    let device = match (&shot.own, &*everything) {
-        (Some(own), Some(all)) if lane.info.device.is_some() => Some(DeviceImages { own, all }),
+    let mut counts: Counts = shot.trace.counts;
+    let spoilt = canary::spoilt(world, truth, (state.moment, &shot.drawn, counts.queries));
+    counts.visible_answers = spoilt.visible_answers.unwrap_or(counts.visible_answers);
+    let device = match (&spoilt.device, &shot.own, &*everything) {
+        (Some([own, all]), ..) => Some(DeviceImages { own, all }),
+        (_, Some(own), Some(all)) if lane.info.device.is_some() => Some(DeviceImages { own, all }),
         _ => None,
     };
-    let counts: Counts = shot.trace.counts;
-    let (drawn, fates) = (shot.drawn.as_slice(), OnceCell::new());
-    let (lane, observer, reference) =
-        (&lane.info, &mut *lane.observer, lane.oracle.reference_image());
+    let drawn = spoilt.drawn.as_ref().unwrap_or(&shot.drawn).as_slice();
+    let reference = spoilt.reference.as_ref().or(lane.oracle.reference_image());
+    let (lane, observer, fates) = (&lane.info, &mut *lane.observer, OnceCell::new());
     let record = FrameRecord { lane, world, state, truth, drawn, counts, device, reference, fates };
     observer.frame(&record);
-    Ok(())
-}
-
-fn run_again(
-    world: &World,
-    repeat: Repeat,
-    lanes: &mut [Lane<'_>],
-    traces: &mut [Trace],
-    tick: &mut dyn FnMut() -> bool,
-) -> Result<(), RunError> {
-    let run = traces.iter().map(|trace| trace.frames.len() as u32).max().unwrap_or(0);
-    let frames = repeat.frames.min(run / world.views());
-    let walls_of = |trace: &Trace| trace.frames.iter().map(|frame| vec![frame.wall_ns]).collect();
-    let mut walls: Vec<Vec<Vec<u64>>> = traces.iter().map(walls_of).collect();
-    for _ in 0..repeat.rounds {
-        let mut cullers: Vec<_> = lanes.iter().map(|lane| (lane.culler)()).collect();
-        for (shot, moment) in Moment::all(world, frames).enumerate() {
-            let state = FrameState::at(world, moment);
-            for (place, (lane, culler)) in lanes.iter_mut().zip(&mut cullers).enumerate() {
-                let first = &traces[place].frames[shot];
-                let facts = (first.visible_parts, first.visible_triangles, first.truth_hash);
-                let again = shoot(world, &state, facts, lane, culler.as_mut(), true)?;
-                walls[place][shot].push(again.trace.wall_ns);
-                lane.observer.repeated(first, &again.trace);
-                if !tick() {
-                    return Err(RunError::Interrupted);
-                }
-            }
-        }
-    }
-    for (trace, walls) in traces.iter_mut().zip(walls) {
-        for (frame, mut walls) in trace.frames.iter_mut().zip(walls) {
-            walls.sort_unstable();
-            frame.wall_ns = walls[(walls.len() - 1) / 2];
-            frame.wall_range_ns = [walls[0], walls[walls.len() - 1]];
-        }
-    }
     Ok(())
 }

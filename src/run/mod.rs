@@ -5,9 +5,12 @@
 mod account;
 mod boxes;
 mod calibrate;
+mod canary;
 mod frame;
+mod heartbeat;
 mod lane;
 mod price;
+mod stop;
 mod told;
 mod trace;
 mod truth;
@@ -15,13 +18,17 @@ mod truth;
 pub use account::{Account, Made, PartTruth, Step, account};
 pub use boxes::Boxes;
 pub use calibrate::{Bench, CalibrationKnobs, Workload, frames_to_measure, measure, workloads};
+pub use canary::Canary;
 pub use frame::{FrameState, FrameWork, World};
+pub use heartbeat::{Beat, oldest_beat};
 pub use lane::{Lane, LaneInfo, Observer, Repeat, RunError, run};
 pub use price::{Arithmetic, Rendering, StatePrice, price_states, render_approximately};
+pub use stop::{Cause, Stop, caught};
 pub use told::told;
-pub use trace::{DeviceImages, FrameRecord, FrameTrace, Moment, Trace};
+pub use trace::{DeviceImages, FrameRecord, FrameTrace, Moment, Repetition, Trace};
 pub use truth::{
     Truth, depth_complexity, difference_to, fates_of_parts, partition_difference, render,
+    render_naively,
 };
 
 /// FNV-1a over whole words with a rotation, the hash of everything a trace compares.

@@ -5,7 +5,7 @@ use std::fmt;
 
 use plainsight_reference::{Fates, Image};
 
-use super::{FrameState, HASH_START, LaneInfo, Truth, World, fates_of_parts, fold};
+use super::{FrameState, HASH_START, LaneInfo, Stop, Truth, World, fates_of_parts, fold};
 use crate::cull::{Counts, Event, Situations};
 use crate::oracle::{Amounts, Clock, Memory, ReadBack};
 use crate::part::PartId;
@@ -63,6 +63,31 @@ pub struct FrameRecord<'a> {
     pub(super) fates: OnceCell<Fates>,
 }
 
+/// A frame that was run for another time, by a new culler, lent to the observers.
+pub struct Repetition<'a> {
+    /// Which lane.
+    pub lane: &'a LaneInfo,
+    /// The scene.
+    pub world: &'a World,
+    /// The frame.
+    pub state: &'a FrameState,
+    /// What it left the first time.
+    pub first: &'a FrameTrace,
+    /// What it left now.
+    pub again: &'a FrameTrace,
+}
+
+impl<'a> FrameRecord<'a> {
+    /// The record with another truth and another picture of what was drawn.
+    #[must_use]
+    pub fn beside(&self, truth: &'a Truth, reference: &'a Image) -> Self {
+        let Self { lane, world, state, drawn, counts, .. } = *self;
+        let device = self.device.as_ref().map(|d| DeviceImages { own: d.own, all: d.all });
+        let (reference, fates) = (Some(reference), self.fates.clone());
+        Self { lane, world, state, truth, drawn, counts, device, reference, fates }
+    }
+}
+
 impl FrameRecord<'_> {
     /// What the lane's device may make of each part, under its tolerance. Slow, and known only once
     /// asked for: the exact truth settles nearly every frame.
@@ -116,6 +141,8 @@ pub struct Trace {
     pub lane: LaneInfo,
     /// Frame by frame, and view by view within a frame.
     pub frames: Vec<FrameTrace>,
+    /// Why it ended early, if it did.
+    pub stop: Option<Stop>,
 }
 
 impl Trace {

@@ -1,9 +1,9 @@
 //! The truth of one frame: the reference's image of every part and what is visible in it.
 
 use plainsight_reference::fast::Instance;
-use plainsight_reference::{Draw, Fates, Image, Tolerance, fast, fates};
+use plainsight_reference::{Draw, Fates, Image, Tolerance, fast, fates, naive};
 
-use super::{FrameState, World};
+use super::{Canary, FrameState, World, canary};
 use crate::oracle::{part_draw, part_instance};
 use crate::part::{ObjectId, PartId, PartitionKnobs};
 
@@ -38,12 +38,27 @@ impl Truth {
         world: &World,
         state: &FrameState,
         mut image: Image,
-        mut visible_pixels: Vec<u32>,
+        visible_pixels: Vec<u32>,
     ) -> Self {
         let all: Vec<PartId> = (0..world.partition.part_count()).map(PartId).collect();
         render(world, state, &all, &mut image);
+        if world.canary == Some(Canary::Truth) {
+            canary::spoil(&mut image);
+        }
+        Self::seen_in(world, image, visible_pixels)
+    }
+
+    /// What the naive renderer says of the frame, which the fast one must equal bit for bit; slow.
+    #[must_use]
+    pub fn naive(world: &World, state: &FrameState) -> Self {
+        let all: Vec<PartId> = (0..world.partition.part_count()).map(PartId).collect();
+        Self::seen_in(world, render_naively(world, state, &all), Vec::new())
+    }
+
+    /// Counts what an image of everything shows.
+    fn seen_in(world: &World, image: Image, mut visible_pixels: Vec<u32>) -> Self {
         visible_pixels.clear();
-        visible_pixels.resize(all.len(), 0);
+        visible_pixels.resize(world.partition.part_count() as usize, 0);
         // Neighbouring samples mostly show one triangle. (`for_each` goes through the image's pieces one by
         // one; a loop over the iterator would ask for the piece at every sample.)
         let (mut last, mut near) = ((u32::MAX, 0), ObjectId(0));
@@ -74,6 +89,16 @@ pub fn render(world: &World, state: &FrameState, parts: &[PartId], image: &mut I
     let instance = |&part: &PartId| part_instance(&world.partition, part, &state.matrices);
     let instances: Vec<Instance<'_>> = parts.iter().map(instance).collect();
     fast::render(image, &instances, world.render);
+}
+
+/// The naive renderer's image of `parts`; slow.
+#[must_use]
+pub fn render_naively(world: &World, state: &FrameState, parts: &[PartId]) -> Image {
+    let mut image = world.image();
+    for &part in parts {
+        naive::draw(&mut image, &part_draw(&world.partition, part, &state.matrices));
+    }
+    image
 }
 
 /// What a device within `tolerance` may make of each part of the frame, by part id; slow.

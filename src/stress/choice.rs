@@ -6,6 +6,7 @@ use crate::cull::{AfterGroup, CullerKind, FullKnobs, Postponement, ProxyKind};
 use crate::index::{INDEXES, IndexKind};
 use crate::oracle::{CostModel, Latency, Misbehaviour, Questions, Schedule};
 use crate::part::{Crossing, PartitionKnobs};
+use crate::run::Canary;
 use crate::scene::generate::{Knobs, SWARM, build};
 use crate::scene::{DepthOrder, Scene, SceneError, Stream, Viewport};
 
@@ -47,6 +48,8 @@ pub struct Choice {
     pub cost: CostModel,
     /// What answers.
     pub device: Device,
+    /// What is wrong on purpose with the world: no seed picks any.
+    pub canary: Option<Canary>,
 }
 
 /// The seed that a user wrote: a number, or the first sixteen digits of a commit's hash of forty, so that a
@@ -150,6 +153,7 @@ impl Choice {
             proxy,
             cost,
             device,
+            canary: None,
         }
     }
 

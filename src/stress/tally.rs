@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Outcome, Probe};
+use crate::check::Ruling;
 
 /// Version of the lines.
 pub const VERSION: u32 = 2;
@@ -20,7 +21,11 @@ pub struct Tally {
     pub repeated: u64,
     /// Worlds in which something failed.
     pub failed: u64,
-    /// The first of them by seed.
+    /// Worlds in which nothing failed but the device: it did not repeat, or it was lost.
+    pub device_at_fault: u64,
+    /// What the worst of all worlds came to.
+    pub ruling: Ruling,
+    /// The worst of them, of those alike the first by seed.
     pub failures: Vec<Outcome>,
     /// The world that drew the most beyond what shows, by parts.
     pub worst_excess: Option<Outcome>,
@@ -39,10 +44,15 @@ impl Tally {
         for probe in &outcome.reached {
             *self.reached.entry(probe.clone()).or_default() += 1;
         }
-        if !outcome.failures.is_empty() {
-            self.failed += 1;
+        let ruling = outcome.ruling();
+        self.ruling = self.ruling.max(ruling);
+        if ruling != Ruling::Held {
+            match ruling {
+                Ruling::Failed => self.failed += 1,
+                _ => self.device_at_fault += 1,
+            }
             self.failures.push(outcome.clone());
-            self.failures.sort_by_key(|failure| failure.seed);
+            self.failures.sort_by_key(|o| (std::cmp::Reverse(o.ruling()), o.seed));
             self.failures.truncate(KEPT_FAILURES);
         }
         let excess =
@@ -87,6 +97,7 @@ mod tests {
             shots: 10,
             failed_in: None,
             failures: failures.iter().map(|line| (*line).to_owned()).collect(),
+            verdict: String::new(),
             reached: vec![Probe::Jumped.to_string()],
             drawn,
             visible: 5,

@@ -4,20 +4,24 @@ use serde::{Deserialize, Serialize};
 
 use super::probe::{Probe, Watch};
 use super::{Choice, Device, Reached};
-use crate::check::Gate;
+use crate::check::{Check, Gate, Ruling, TruthCheck};
 use crate::cull::{CullerSetup, Full, PerView};
 use crate::oracle::{
     HierarchicalZ, Misbehaviour, Oracle, OracleError, Questions, Sim, Simulated, Stage,
 };
 use crate::part::PartId;
 use crate::run::{
-    FrameRecord, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World, run,
+    Canary, Cause, FrameRecord, Lane, LaneInfo, Moment, Observer, Repeat, Repetition, RunError,
+    Stop, Trace, World, run,
 };
-use crate::scene::{Lens, Scene};
+use crate::scene::{Lens, Scene, Stream};
 
 /// One world in so many is run twice and compared, frame by frame, by a hash of every draw, question and
 /// answer in order.
 pub const REPEATED_ONE_IN: u64 = 20;
+/// One frame in so many is drawn by the naive renderer too. It takes NAIVE_TIMES times as long as all else of
+/// a frame, so this takes a few hundredths of a sweep's time.
+const NAIVE_ONE_IN: u32 = 64;
 
 /// What became of a seed; a line of JSON, so that sweeps can be merged.
 #[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
@@ -32,6 +36,9 @@ pub struct Outcome {
     pub shots: u32,
     /// What failed, a line each; empty where all held.
     pub failures: Vec<String>,
+    /// The gate's word: `held`, `failed`, `device not repeatable` or `device lost`.
+    #[serde(default)]
+    pub verdict: String,
     /// The frame in which something failed first.
     pub failed_in: Option<u32>,
     /// Names of the probes that were reached.
@@ -62,6 +69,9 @@ struct Watched {
     wrong: Option<(Moment, Vec<PartId>)>,
     /// Frames and views seen.
     shots: u32,
+    /// Whether the device is to go away, and whether it has.
+    to_be_lost: bool,
+    lost: bool,
 }
 
 impl Observer for Watched {
@@ -74,8 +84,18 @@ impl Observer for Watched {
         }
     }
 
-    fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
-        self.gate.repeated(first, again);
+    fn repeated(&mut self, repetition: &Repetition<'_>) {
+        self.gate.repeated(repetition);
+    }
+
+    fn stopped(&mut self, stop: &Stop) {
+        // It must end so, and all frames before must be right.
+        let lost = matches!(stop.cause, Cause::Oracle(OracleError::Lost(_)));
+        if lost && self.to_be_lost {
+            self.lost = true;
+        } else {
+            self.gate.stopped(stop);
+        }
     }
 }
 
@@ -86,10 +106,8 @@ pub type MakeReal<'a> = dyn Fn(&Stage, Questions) -> Result<Box<dyn Oracle>, Ora
 /// one.
 ///
 /// # Errors
-/// What the oracle said. A device that goes away is no failure of a culler.
-///
-/// # Panics
-/// Where a culler's own invariants are broken, in builds with debug assertions.
+/// Where no oracle can be made. A device that goes away later is in the outcome, and so is a panic of the
+/// culler.
 pub fn judged(choice: &Choice, real: &MakeReal<'_>) -> Result<Outcome, RunError> {
     let scene = choice.scene().expect("the swarm has a scene for every seed");
     judged_in(choice, scene, real).map(|judged| judged.outcome)
@@ -109,12 +127,9 @@ pub struct Judged {
 ///
 /// # Errors
 /// As [`judged`].
-///
-/// # Panics
-/// As [`judged`].
 pub fn judged_in(choice: &Choice, scene: Scene, real: &MakeReal<'_>) -> Result<Judged, RunError> {
     let (said, frames) = (summary(&scene), scene.frames);
-    let world = World::new(scene, choice.partition);
+    let world = World::new(scene, choice.partition).with_canary(choice.canary);
     let stage = world.stage();
     let oracle: Box<dyn Oracle> = match choice.device {
         Device::Sim => Box::new(Sim::new(stage)),
@@ -137,22 +152,22 @@ pub fn judged_in(choice: &Choice, scene: Scene, real: &MakeReal<'_>) -> Result<J
             None => (choice.culler.make)(setup),
         }
     };
-    let mut watched = Watched::default();
+    // What goes wrong goes wrong once, and not again in a repetition.
+    let wrong = choice.misbehaviour();
+    let to_be_lost = wrong.is_some_and(Misbehaviour::is_fatal);
+    let truth = TruthCheck::sampling(Stream::new(choice.seed, "naive"), NAIVE_ONE_IN);
+    let gate = Gate::default().sampling(truth);
+    let mut watched = Watched { gate, to_be_lost, ..Watched::default() };
     let info = LaneInfo::of(choice.culler.name, oracle.as_ref(), String::new());
     let culler = Box::new(|| PerView::over(world.views(), make));
     let lane = Lane { info, culler, oracle, observer: &mut watched, with_bound: false };
-    // What goes wrong goes wrong once, and not again in a repetition.
-    let wrong = choice.misbehaviour();
-    let repeated = choice.seed.is_multiple_of(REPEATED_ONE_IN) && wrong.is_none();
+    let wanted = choice.canary.is_some_and(Canary::wants_repetition);
+    let repeated = wanted || choice.seed.is_multiple_of(REPEATED_ONE_IN) && wrong.is_none();
     let repeat = if repeated { Repeat::first(frames) } else { Repeat::NONE };
-    let ran = run(&world, frames, repeat, &mut [lane], &mut || true);
-    let outcome = match (ran, wrong) {
-        (Ok(traces), _) => outcome(choice, said, &traces[0], &mut watched, repeated),
-        // It must end so, and all frames before must be right.
-        (Err(RunError::Oracle(OracleError::Lost(_))), Some(wrong)) if wrong.is_fatal() => {
-            ended(choice, said, wrong, &mut watched)
-        }
-        (Err(error), _) => return Err(error),
+    let traces = run(&world, frames, repeat, &mut [lane], &mut || true)?;
+    let outcome = match wrong.filter(|_| watched.lost) {
+        Some(wrong) => ended(choice, said, wrong, &mut watched),
+        None => outcome(choice, said, &traces[0], &mut watched, repeated),
     };
     Ok(Judged { outcome, wrong: watched.wrong, world })
 }
@@ -169,6 +184,7 @@ fn ended(choice: &Choice, scene: String, wrong: Misbehaviour, watched: &mut Watc
         scene,
         shots: *shots,
         failures: gate.failures(),
+        verdict: gate.word(),
         failed_in: gate.first_failure().map(|moment| moment.frame),
         reached: reached.probes().iter().map(Probe::to_string).collect(),
         drawn: gate.excess.drawn(),
@@ -182,15 +198,16 @@ fn ended(choice: &Choice, scene: String, wrong: Misbehaviour, watched: &mut Watc
 }
 
 impl Outcome {
-    /// Of a world whose run ended in a panic.
+    /// Of a world that could not be run to any end, for what `check` says.
     #[must_use]
-    pub fn panicked(choice: &Choice, said: &str) -> Self {
+    pub fn unrun(choice: &Choice, check: Check, said: &str) -> Self {
         Self {
             seed: choice.seed,
             options: choice.to_string(),
             scene: choice.scene().map_or_else(|error| error.to_string(), |scene| summary(&scene)),
             shots: 0,
-            failures: vec![format!("panic: {said}")],
+            failures: vec![format!("{}: {said}", check.name())],
+            verdict: check.ruling().word().to_owned(),
             failed_in: None,
             reached: Vec::new(),
             drawn: 0,
@@ -200,6 +217,15 @@ impl Outcome {
             repeated: false,
             hash: String::new(),
             replay: String::new(),
+        }
+    }
+
+    /// What the world came to. A line without a verdict was written before there were several.
+    #[must_use]
+    pub fn ruling(&self) -> Ruling {
+        match self.failures.is_empty() {
+            true => Ruling::Held,
+            false => Ruling::of(&self.verdict).unwrap_or(Ruling::Failed).max(Ruling::NotRepeatable),
         }
     }
 }
@@ -226,6 +252,7 @@ fn outcome(
         scene,
         shots: trace.frames.len() as u32,
         failures: gate.failures(),
+        verdict: gate.word(),
         failed_in: gate.first_failure().map(|moment| moment.frame),
         reached: reached.probes().iter().map(Probe::to_string).collect(),
         drawn: trace.sum(|frame| u64::from(frame.drawn_parts)),

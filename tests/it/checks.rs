@@ -10,8 +10,8 @@ use plainsight::oracle::{
 };
 use plainsight::part::{PartId, PartitionKnobs};
 use plainsight::run::{
-    FrameState, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, Truth, World, fates_of_parts,
-    run,
+    FrameState, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, Repetition, Truth, World,
+    fates_of_parts, run,
 };
 use plainsight::scene::generate::{Knobs, build};
 use plainsight::scene::{Scene, Viewport};
@@ -222,13 +222,20 @@ fn what_did_not_repeat_is_named() {
     let words = |change: fn(&mut FrameTrace)| {
         let (mut gate, mut again) = (Gate::default(), first.clone());
         change(&mut again);
-        gate.repeated(first, &again);
-        gate.determinism.first_event().to_owned()
+        let (world, lane) = (world(), &verdict.trace.lane);
+        let state = FrameState::first(&world);
+        let (world, state, again) = (&world, &state, &again);
+        gate.repeated(&Repetition { lane, world, state, first, again });
+        (gate.determinism.first_event().to_owned(), gate.word())
     };
-    assert_eq!(words(|_| {}), "");
-    let was_not = |what: &str| format!("all events were the same, {what} was not");
+    assert_eq!(words(|_| {}), (String::new(), "held".to_owned()));
+    let was_not =
+        |what: &str| (format!("all events were the same, {what} was not"), "failed".to_owned());
     assert_eq!(words(|t| t.truth_hash ^= 1), was_not("the truth's image"));
-    assert_eq!(words(|t| t.image_hash ^= 1), was_not("the image of what was drawn"));
+    assert_eq!(words(|t| t.counts.round_trips += 1), was_not("the number of round trips"));
+    // A picture is the device's.
+    let device = (String::new(), "device not repeatable".to_owned());
+    assert_eq!(words(|t| t.image_hash ^= 1), device);
 }
 
 #[test]
