@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Conservative, CountsCheck, Determinism, DeviceImage, Excess, ImageCheck};
+use super::{Conservative, CountsCheck, Determinism, DeviceImage, Excess, ImageCheck, Invariants};
 use crate::cull::{Culler, CullerSetup, PerView, ProxyKind};
 use crate::index::INDEXES;
 use crate::oracle::{CostModel, Oracle, Sim};
@@ -32,6 +32,8 @@ pub struct Gate {
     pub counts: CountsCheck,
     /// What was drawn in vain.
     pub excess: Excess,
+    /// Promises made on the way.
+    pub invariants: Invariants,
     /// Whether parts may be missing for some frames: then pictures may lack them, and are not compared.
     late: bool,
 }
@@ -45,6 +47,10 @@ impl Observer for Gate {
         }
         self.counts.frame(record);
         self.excess.frame(record);
+    }
+
+    fn broken(&mut self, moment: Moment, promise: &str) {
+        self.invariants.broken(moment, promise);
     }
 
     fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
@@ -85,7 +91,8 @@ impl Gate {
         let images = self.image.differences().iter().chain(self.device_image.differences());
         let images = images.map(|difference| difference.moment);
         let others = [self.determinism.first_difference(), self.counts.overcounted()];
-        misses.chain(images).chain(others.into_iter().flatten()).min()
+        let broken = self.invariants.first().map(|(moment, _)| moment);
+        misses.chain(images).chain(others.into_iter().flatten()).chain(broken).min()
     }
 
     /// Each failure as a line: frame, part, pixel.
@@ -124,6 +131,10 @@ impl Gate {
         }
         if let Some(moment) = self.counts.overcounted() {
             lines.push(format!("counts: {moment} has more answers than questions"));
+        }
+        if let Some((moment, promise)) = self.invariants.first() {
+            let count = self.invariants.count();
+            lines.push(format!("invariant: {count} frames break one, first {moment}: {promise}"));
         }
         lines
     }
@@ -183,7 +194,7 @@ pub fn judge(
     let info = LaneInfo::of(name, oracle.as_ref(), replay);
     let mut gate = Gate::default();
     let (culler, observer) = (Box::new(culler), &mut gate);
-    let lane = Lane { info, culler, oracle, observer, with_bound: false };
+    let lane = Lane { info, culler, oracle, observer, with_bound: false, audited: true };
     let mut traces = run::run(&world, frames, REPEAT, &mut [lane], &mut || true)?;
     let trace = traces.pop().expect("one lane leaves one trace");
     Ok(Verdict { trace, gate })

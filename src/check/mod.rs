@@ -8,6 +8,7 @@ mod device_image;
 mod excess;
 mod gate;
 mod image;
+mod invariants;
 
 pub use conservative::{Conservative, Miss};
 pub use counts::CountsCheck;
@@ -16,3 +17,4 @@ pub use device_image::DeviceImage;
 pub use excess::Excess;
 pub use gate::{Gate, Verdict, judge};
 pub use image::ImageCheck;
+pub use invariants::Invariants;

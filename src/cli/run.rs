@@ -16,7 +16,7 @@ use crate::index::{Entry, INDEXES, IndexKind};
 use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
 use crate::oracle::{
     Always, Approximate, CostModel, HierarchicalZ, Oracle, OracleError, Questions, Schedule, Sim,
-    Simulated, Stage,
+    Simulated, Stage, Tables,
 };
 use crate::part::{Cache, PartId};
 use crate::report::{Row, junit, table};
@@ -55,10 +55,11 @@ pub(super) struct Oracles {
 impl Oracles {
     /// Whether every name is one of an oracle.
     pub(super) fn known(names: &[String]) -> Result<(), CliError> {
-        let known: Vec<&str> = ["sim", "hierarchical-z", "simulated", "last-frame", "always"]
-            .into_iter()
-            .chain(Questions::ALL.map(Questions::name))
-            .collect();
+        let known: Vec<&str> =
+            ["sim", "hierarchical-z", "tables", "simulated", "last-frame", "always"]
+                .into_iter()
+                .chain(Questions::ALL.map(Questions::name))
+                .collect();
         names.iter().find(|name| !known.contains(&name.as_str())).map_or(Ok(()), |name| {
             let what = format!("no oracle is called '{name}'; there are {}", known.join(", "));
             Err(CliError::Usage(what))
@@ -135,6 +136,7 @@ impl StagedOracles<'_> {
         match name {
             "sim" => Ok(Box::new(Sim::new(self.stage.clone()))),
             "hierarchical-z" => Ok(Box::new(HierarchicalZ::new(self.stage.clone()))),
+            "tables" => Ok(Box::new(Tables::new(self.stage.clone()))),
             "simulated" => {
                 let (cost, schedule) = self.simulated.clone();
                 Ok(Box::new(Simulated::new(self.stage.clone(), cost, schedule)))
@@ -353,7 +355,7 @@ impl Plan<'_> {
             let culler = self.factory(kind, &world, &entries);
             let first = running.iter().all(|lane| lane.info.oracle != info.oracle);
             let with_bound = self.with_bound && first;
-            running.push(Lane { info, culler, oracle, observer, with_bound });
+            running.push(Lane { info, culler, oracle, observer, with_bound, audited: false });
         }
         bar.set_message(name.clone());
         let mut tick = || {
@@ -380,7 +382,8 @@ impl Plan<'_> {
         let oracle = staged.make(&staged.names[0])?;
         let info = LaneInfo::of(self.cullers[0].name, oracle.as_ref(), String::new());
         let culler = self.factory(self.cullers[0], world, &entries);
-        let lane = Lane { info, culler, oracle, observer: &mut seen, with_bound: false };
+        let lane =
+            Lane { info, culler, oracle, observer: &mut seen, with_bound: false, audited: false };
         let frames = moment.frame + 1;
         bar.inc_length(u64::from(frames) * u64::from(world.views()));
         let mut tick = || {

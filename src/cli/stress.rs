@@ -28,6 +28,8 @@ use crate::stress::{
 const DEFAULT_SEEDS: (u64, u64) = (0, 1000);
 /// Worlds between two looks at the clock and at Ctrl-C; they run on all cores.
 const CHUNK: usize = 64;
+/// Members and pairs of them that are named for coming up the least.
+const RAREST: usize = 6;
 /// Failing seeds said in full.
 const SAID_FAILURES: usize = 5;
 /// Seeds looked at for a world in which something shows.
@@ -60,7 +62,8 @@ pub(super) struct StressArgs {
     /// Part of the name of the Vulkan adapter to use.
     #[arg(long)]
     adapter: Option<String>,
-    /// Fail as well where some situation was never reached.
+    /// Fail as well where some situation was never reached, or some member or pair of members was picked too
+    /// seldom.
     #[arg(long)]
     every_probe: bool,
     /// Make the first failing world as small as it goes, and leave it in this folder: a scene file that
@@ -261,13 +264,14 @@ impl Sweep<'_> {
             writeln!(to, "  picture: {}", picture.display())?;
         }
         let file = quoted(&file.display().to_string());
-        match choice.policy {
-            None => writeln!(to, "  replay: plainsight run --scene {file}{}", choice.flags())?,
-            // The scene file stands alone, but no flag of `run` sets a policy of `full`.
-            Some(_) => writeln!(
+        match choice.beyond_flags().as_slice() {
+            [] => writeln!(to, "  replay: plainsight run --scene {file}{}", choice.flags())?,
+            // The scene file stands alone, but no flag of `run` sets these.
+            needed => writeln!(
                 to,
-                "  replay: {} (fails by the policy of full alone, for which run has no flags)",
-                self.replay(seed)
+                "  replay: {} (fails by {} alone, for which run has no flags)",
+                self.replay(seed),
+                needed.join(", ")
             )?,
         }
         Ok(())
@@ -438,6 +442,16 @@ fn conclude(args: &StressArgs, tally: &Tally, to: &mut dyn std::io::Write) -> Re
     for (probe, count) in tally.probes().into_iter().filter(|&(_, count)| said(count)) {
         writeln!(to, "  {count:>9}  {probe}")?;
     }
+    if tally.worlds > 1 {
+        let members = tally.members();
+        let said = members.iter().take(RAREST).map(|(count, member)| format!("{member} {count}"));
+        let said = said.collect::<Vec<_>>().join(", ");
+        writeln!(to, "rarest of {} members: {said}", members.len())?;
+        let pairs = tally.pairs();
+        let said = pairs.iter().take(RAREST).map(|(n, [a, b])| format!("{a} with {b} {n}"));
+        let said = said.collect::<Vec<_>>().join(", ");
+        writeln!(to, "rarest of {} pairs: {said}", pairs.len())?;
+    }
     let mut worst = |what: &str, outcome: &Option<Outcome>, figure: &dyn Fn(&Outcome) -> f64| {
         outcome.as_ref().map_or(Ok(()), |o| {
             writeln!(
@@ -460,11 +474,13 @@ fn conclude(args: &StressArgs, tally: &Tally, to: &mut dyn std::io::Write) -> Re
         failure.failures.iter().try_for_each(|line| writeln!(to, "  {line}"))?;
         writeln!(to, "  replay: {}", failure.replay)?;
     }
-    let never = tally.never_reached();
+    let (never, rare) = (tally.never_reached(), tally.rare());
     if args.every_probe {
         never.iter().try_for_each(|probe| writeln!(to, "NEVER REACHED: {probe}"))?;
+        rare.iter().try_for_each(|line| writeln!(to, "TOO RARE: {line}"))?;
     }
-    let held = tally.failed == 0 && (never.is_empty() || !args.every_probe);
+    let reached = never.is_empty() && rare.is_empty();
+    let held = tally.failed == 0 && (reached || !args.every_probe);
     let word = if held { "held" } else { "failed" };
     writeln!(
         to,

@@ -2,13 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::beside::{Beside, go_on_alone};
 use super::probe::{Probe, Watch};
-use super::{Choice, Device, Reached};
+use super::{Choice, Reached};
 use crate::check::Gate;
-use crate::cull::{CullerSetup, Full, PerView};
-use crate::oracle::{
-    HierarchicalZ, Misbehaviour, Oracle, OracleError, Questions, Sim, Simulated, Stage,
-};
+use crate::cull::{CullerSetup, PerView};
+use crate::oracle::{Memory, Misbehaviour, Oracle, OracleError, Questions, Stage};
 use crate::part::PartId;
 use crate::run::{
     FrameRecord, FrameTrace, Lane, LaneInfo, Moment, Observer, Repeat, RunError, Trace, World, run,
@@ -28,6 +27,8 @@ pub struct Outcome {
     pub options: String,
     /// What is in the scene.
     pub scene: String,
+    /// What it picked of each family, by name.
+    pub members: Vec<String>,
     /// Frames times views.
     pub shots: u32,
     /// What failed, a line each; empty where all held.
@@ -54,10 +55,10 @@ pub struct Outcome {
 }
 
 /// The gate, and who watches for probes.
-#[derive(Default)]
 struct Watched {
     gate: Gate,
     watch: Watch,
+    beside: Beside,
     /// What was drawn when something failed first.
     wrong: Option<(Moment, Vec<PartId>)>,
     /// Frames and views seen.
@@ -69,9 +70,18 @@ impl Observer for Watched {
         self.shots += 1;
         self.gate.frame(record);
         self.watch.frame(record);
+        let moment = record.state.moment;
+        if let Err(promise) = self.beside.frame(record) {
+            self.gate.broken(moment, &promise);
+        }
+        self.watch.shape(self.beside.shape);
         if self.wrong.is_none() && self.gate.first_failure().is_some() {
             self.wrong = Some((record.state.moment, record.drawn.to_vec()));
         }
+    }
+
+    fn broken(&mut self, moment: Moment, promise: &str) {
+        self.gate.broken(moment, promise);
     }
 
     fn repeated(&mut self, first: &FrameTrace, again: &FrameTrace) {
@@ -89,7 +99,7 @@ pub type MakeReal<'a> = dyn Fn(&Stage, Questions) -> Result<Box<dyn Oracle>, Ora
 /// What the oracle said. A device that goes away is no failure of a culler.
 ///
 /// # Panics
-/// Where a culler's own invariants are broken, in builds with debug assertions.
+/// Where a culler does.
 pub fn judged(choice: &Choice, real: &MakeReal<'_>) -> Result<Outcome, RunError> {
     let scene = choice.scene().expect("the swarm has a scene for every seed");
     judged_in(choice, scene, real).map(|judged| judged.outcome)
@@ -115,37 +125,44 @@ pub struct Judged {
 pub fn judged_in(choice: &Choice, scene: Scene, real: &MakeReal<'_>) -> Result<Judged, RunError> {
     let (said, frames) = (summary(&scene), scene.frames);
     let world = World::new(scene, choice.partition);
-    let stage = world.stage();
-    let oracle: Box<dyn Oracle> = match choice.device {
-        Device::Sim => Box::new(Sim::new(stage)),
-        Device::HierarchicalZ => Box::new(HierarchicalZ::new(stage)),
-        Device::Simulated(schedule) => {
-            Box::new(Simulated::new(stage, choice.cost.clone(), schedule))
-        }
-        Device::Real(questions) => real(&stage, questions)?,
+    let cut = world.partition.check();
+    let world = match choice.memory_knobs(&world.partition) {
+        Some(memory) => world.within(memory)?,
+        None => world,
     };
+    let oracle = choice.oracle(world.stage(), real)?;
     let entries = world.entries();
     let make = || {
         let setup = CullerSetup {
             partition: world.partition.clone(),
-            index: (choice.index.build)(&entries),
+            index: choice.build(&entries),
             proxy: choice.proxy,
             cost: choice.cost.clone(),
         };
-        match &choice.policy {
-            Some(knobs) => Box::new(Full::new(setup, knobs.clone())),
-            None => (choice.culler.make)(setup),
-        }
+        choice.make(setup)
     };
-    let mut watched = Watched::default();
+    let beside = Beside::new(choice, &world, entries.clone());
+    let (gate, watch) = (Gate::default(), Watch::default());
+    let mut watched = Watched { gate, watch, beside, wrong: None, shots: 0 };
+    if let Err(promise) = cut {
+        watched.gate.broken(Moment { frame: 0, view: 0 }, &promise);
+    }
     let info = LaneInfo::of(choice.culler.name, oracle.as_ref(), String::new());
     let culler = Box::new(|| PerView::over(world.views(), make));
-    let lane = Lane { info, culler, oracle, observer: &mut watched, with_bound: false };
+    // What a real device's tolerance makes of an answer the audit does not know.
+    let audited = oracle.device().is_none();
+    let observer = &mut watched;
+    let lane = Lane { info, culler, oracle, observer, with_bound: false, audited };
     // What goes wrong goes wrong once, and not again in a repetition.
     let wrong = choice.misbehaviour();
     let repeated = choice.seed.is_multiple_of(REPEATED_ONE_IN) && wrong.is_none();
     let repeat = if repeated { Repeat::first(frames) } else { Repeat::NONE };
     let ran = run(&world, frames, repeat, &mut [lane], &mut || true);
+    if choice.is_large()
+        && let Err((frame, promise)) = go_on_alone(choice, &world)
+    {
+        watched.gate.broken(Moment { frame, view: 0 }, &promise);
+    }
     let outcome = match (ran, wrong) {
         (Ok(traces), _) => outcome(choice, said, &traces[0], &mut watched, repeated),
         // It must end so, and all frames before must be right.
@@ -167,6 +184,7 @@ fn ended(choice: &Choice, scene: String, wrong: Misbehaviour, watched: &mut Watc
         seed: choice.seed,
         options: choice.to_string(),
         scene,
+        members: names(choice),
         shots: *shots,
         failures: gate.failures(),
         failed_in: gate.first_failure().map(|moment| moment.frame),
@@ -189,6 +207,7 @@ impl Outcome {
             seed: choice.seed,
             options: choice.to_string(),
             scene: choice.scene().map_or_else(|error| error.to_string(), |scene| summary(&scene)),
+            members: names(choice),
             shots: 0,
             failures: vec![format!("panic: {said}")],
             failed_in: None,
@@ -212,7 +231,13 @@ fn outcome(
     repeated: bool,
 ) -> Outcome {
     let reached: &mut Reached = &mut watch.reached;
+    reached.note(Probe::Large, choice.is_large());
     trace.frames.iter().for_each(|frame| reached.note_situations(frame.situations));
+    let memory = || trace.frames.iter().filter_map(|frame| frame.memory);
+    let some = |figure: fn(&Memory) -> u64| memory().any(|memory| figure(&memory) > 0);
+    reached.note(Probe::LoadedLate, some(|memory| memory.late_loads));
+    reached.note(Probe::LoadedAhead, some(|memory| memory.prefetches_used));
+    reached.note(Probe::ThrownOut, some(|memory| memory.evictions));
     let clock = trace.frames.iter().filter_map(|frame| frame.clock).next_back();
     if let Some(clock) = clock {
         reached.note(Probe::FalseVisible, clock.false_visible > 0);
@@ -224,6 +249,7 @@ fn outcome(
         seed: choice.seed,
         options: choice.to_string(),
         scene,
+        members: names(choice),
         shots: trace.frames.len() as u32,
         failures: gate.failures(),
         failed_in: gate.first_failure().map(|moment| moment.frame),
@@ -236,6 +262,11 @@ fn outcome(
         hash: format!("{:016x}", trace.hash()),
         replay: String::new(),
     }
+}
+
+/// What a world picked of each family, the family's name before the member's.
+fn names(choice: &Choice) -> Vec<String> {
+    choice.members().into_iter().map(|(family, member)| format!("{family} {member}")).collect()
 }
 
 /// What is in a scene, in a line.
