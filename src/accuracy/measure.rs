@@ -204,7 +204,14 @@ pub fn measure(
             let oracle = device(world, tuning, cost);
             let info = LaneInfo::of(settings[place].knob, oracle.as_ref(), String::new());
             let culler = Box::new(culler);
-            lanes.push(Lane { info, culler, oracle, observer: meter, with_bound: false });
+            lanes.push(Lane {
+                info,
+                culler,
+                oracle,
+                observer: meter,
+                with_bound: false,
+                audited: false,
+            });
         }
         let repeat = Repeat { frames: u32::MAX, rounds: rounds.saturating_sub(1) };
         let traces = run(&world, scene.frames, repeat, &mut lanes, tick)?;

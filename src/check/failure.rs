@@ -21,6 +21,8 @@ pub enum Check {
     Determinism,
     /// No more answers than questions.
     Counts,
+    /// No promise of the culler, its index or its oracle is broken on the way.
+    Invariant,
     /// Nothing panics.
     Panic,
     /// Every frame ends in time.
@@ -42,6 +44,7 @@ impl Check {
             Self::DeviceImage => "device image",
             Self::Determinism => "determinism",
             Self::Counts => "counts",
+            Self::Invariant => "invariant",
             Self::Panic => "panic",
             Self::Hang => "hang",
             Self::Repeatable => "device not repeatable",

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::{
     Check, Conservative, CountsCheck, Determinism, DeviceImage, Excess, Failure, ImageCheck,
-    Ruling, TruthCheck,
+    Invariants, Ruling, TruthCheck,
 };
 use crate::cull::{Culler, CullerSetup, PerView, ProxyKind};
 use crate::index::INDEXES;
@@ -40,6 +40,8 @@ pub struct Gate {
     pub truth: TruthCheck,
     /// Why the lane ended early.
     stop: Option<Stop>,
+    /// Promises made on the way.
+    pub invariants: Invariants,
     /// Whether parts may be missing for some frames: then pictures may lack them, and are not compared.
     late: bool,
 }
@@ -71,6 +73,10 @@ impl Observer for Gate {
                 self.image.look_again(&record);
             }
         }
+    }
+
+    fn broken(&mut self, moment: Moment, promise: &str) {
+        self.invariants.broken(moment, promise);
     }
 
     fn repeated(&mut self, repetition: &Repetition<'_>) {
@@ -199,6 +205,11 @@ impl Gate {
             let said = format!("{moment} has more answers than questions");
             found.push(Failure::new(Check::Counts, Some(moment), said));
         }
+        if let Some((moment, promise)) = self.invariants.first() {
+            let count = self.invariants.count();
+            let said = format!("{count} frames break one, first {moment}: {promise}");
+            found.push(Failure::new(Check::Invariant, Some(moment), said));
+        }
         if let Some((moment, said)) = self.determinism.device() {
             found.push(Failure::new(Check::Repeatable, Some(moment), said));
         }
@@ -268,7 +279,7 @@ pub fn judge(
     let info = LaneInfo::of(name, oracle.as_ref(), replay);
     let mut gate = Gate::default();
     let (culler, observer) = (Box::new(culler), &mut gate);
-    let lane = Lane { info, culler, oracle, observer, with_bound: false };
+    let lane = Lane { info, culler, oracle, observer, with_bound: false, audited: true };
     let mut traces = run::run(&world, frames, REPEAT, &mut [lane], &mut || true)?;
     let trace = traces.pop().expect("one lane leaves one trace");
     Ok(Verdict { trace, gate })

@@ -9,6 +9,7 @@ mod excess;
 mod failure;
 mod gate;
 mod image;
+mod invariants;
 mod truth;
 
 pub use conservative::{Conservative, Miss};
@@ -19,4 +20,5 @@ pub use excess::Excess;
 pub use failure::{Check, Failure, Ruling};
 pub use gate::{Gate, Verdict, judge};
 pub use image::ImageCheck;
+pub use invariants::Invariants;
 pub use truth::{Disagreement, TruthCheck};

@@ -180,8 +180,8 @@ pub(super) struct RunArgs {
     /// Cullers (default: full simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
-    /// Oracles: sim, hierarchical-z, simulated, last-frame, hardware, pyramid, read-back,
-    /// always (default: sim, and hardware where a Vulkan device is found).
+    /// Oracles: sim, hierarchical-z, tables, simulated, last-frame, hardware, pyramid,
+    /// read-back, always (default: sim, and hardware where a Vulkan device is found).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) oracle: Vec<String>,
     #[command(flatten)]
@@ -207,8 +207,8 @@ pub(super) struct CompareArgs {
     /// Cullers (default: full full-adaptive full-trusting simple vfc).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) culler: Vec<String>,
-    /// Oracles: sim, hierarchical-z, simulated, last-frame, hardware, pyramid, read-back,
-    /// always (default: sim, and hardware where a Vulkan device is found).
+    /// Oracles: sim, hierarchical-z, tables, simulated, last-frame, hardware, pyramid,
+    /// read-back, always (default: sim, and hardware where a Vulkan device is found).
     #[arg(long, num_args = 1.., value_delimiter = ',')]
     pub(super) oracle: Vec<String>,
     /// Leaf sizes to compare, most triangles in a part (default: --leaf; at full size those that the

@@ -27,6 +27,10 @@ pub(super) fn list(cullers: &[CullerKind], streams: &mut Streams<'_>) -> Result<
             "the reference's depth as a pyramid of maxima, a handful of texels a question",
         ),
         (
+            "tables",
+            "the reference's depth by tables of maxima, the answers of read-back without a device",
+        ),
+        (
             "simulated",
             "the reference as a device with a clock: late answers, doubt (--latency, --doubt)",
         ),

@@ -8,7 +8,7 @@ use super::{CliError, Streams};
 use crate::oracle::wgpu::{Gpu, GpuStage, Hardware};
 use crate::oracle::{
     Always, Approximate, CostModel, HierarchicalZ, Oracle, OracleError, Questions, Schedule, Sim,
-    Simulated, Stage,
+    Simulated, Stage, Tables,
 };
 
 /// The oracles of one invocation; the device is opened once.
@@ -22,10 +22,11 @@ pub(super) struct Oracles {
 impl Oracles {
     /// Whether every name is one of an oracle.
     pub(super) fn known(names: &[String]) -> Result<(), CliError> {
-        let known: Vec<&str> = ["sim", "hierarchical-z", "simulated", "last-frame", "always"]
-            .into_iter()
-            .chain(Questions::ALL.map(Questions::name))
-            .collect();
+        let known: Vec<&str> =
+            ["sim", "hierarchical-z", "tables", "simulated", "last-frame", "always"]
+                .into_iter()
+                .chain(Questions::ALL.map(Questions::name))
+                .collect();
         names.iter().find(|name| !known.contains(&name.as_str())).map_or(Ok(()), |name| {
             let what = format!("no oracle is called '{name}'; there are {}", known.join(", "));
             Err(CliError::Usage(what))
@@ -105,6 +106,7 @@ impl StagedOracles<'_> {
         match name {
             "sim" => Ok(Box::new(Sim::new(self.stage.clone()))),
             "hierarchical-z" => Ok(Box::new(HierarchicalZ::new(self.stage.clone()))),
+            "tables" => Ok(Box::new(Tables::new(self.stage.clone()))),
             "simulated" => {
                 let (cost, schedule) = self.simulated.clone();
                 Ok(Box::new(Simulated::new(self.stage.clone(), cost, schedule)))

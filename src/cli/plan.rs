@@ -260,7 +260,7 @@ impl Plan<'_> {
             let culler = self.factory(kind, &world, &entries);
             let first = running.iter().all(|lane| lane.info.oracle != info.oracle);
             let with_bound = self.with_bound && first;
-            running.push(Lane { info, culler, oracle, observer, with_bound });
+            running.push(Lane { info, culler, oracle, observer, with_bound, audited: false });
         }
         bar.set_message(name.clone());
         let mut tick = || {
@@ -287,7 +287,8 @@ impl Plan<'_> {
         let oracle = staged.make(&staged.names[0])?;
         let info = LaneInfo::of(self.cullers[0].name, oracle.as_ref(), String::new());
         let culler = self.factory(self.cullers[0], world, &entries);
-        let lane = Lane { info, culler, oracle, observer: &mut seen, with_bound: false };
+        let lane =
+            Lane { info, culler, oracle, observer: &mut seen, with_bound: false, audited: false };
         let frames = moment.frame + 1;
         bar.inc_length(u64::from(frames) * u64::from(world.views()));
         let mut tick = || {

@@ -25,14 +25,16 @@ use crate::report::{difference_picture, picture_png};
 use crate::run::{Canary, FrameState, RunError, Truth, caught, render};
 use crate::scene::{Scene, Viewport, to_toml};
 use crate::stress::{
-    Choice, Device, Judged, Outcome, REPEATED_ONE_IN, Shard, Shrunk, Tally, judged, judged_in,
-    seed_of, shrink, size,
+    Choice, Device, Judged, Outcome, REPEATED_ONE_IN, Shard, Shrunk, Source, Tally, judged,
+    judged_in, seed_of, shrink, size,
 };
 
 /// Seeds of a sweep where nothing is said.
 const DEFAULT_SEEDS: (u64, u64) = (0, 1000);
 /// Worlds between two looks at the clock and at Ctrl-C; they run on all cores.
 const CHUNK: usize = 64;
+/// Members and pairs of them that are named for coming up the least.
+const RAREST: usize = 6;
 /// Failing seeds said in full.
 const SAID_FAILURES: usize = 5;
 /// Seeds looked at for a world in which something shows.
@@ -65,7 +67,8 @@ pub(super) struct StressArgs {
     /// Part of the name of the Vulkan adapter to use.
     #[arg(long)]
     adapter: Option<String>,
-    /// Fail as well where some situation was never reached.
+    /// Fail as well where some situation was never reached, or some member or pair of members was picked too
+    /// seldom.
     #[arg(long)]
     every_probe: bool,
     /// Make the first failing world as small as it goes, and leave it in this folder: a scene file that
@@ -304,17 +307,18 @@ impl Sweep<'_> {
             writeln!(to, "  picture: {}", picture.display())?;
         }
         let file = quoted(&file.display().to_string());
-        match choice.policy {
-            None => {
+        match choice.beyond_flags().as_slice() {
+            [] => {
                 // What was run twice may be what failed.
                 let twice = if seed.is_multiple_of(REPEATED_ONE_IN) { " --rounds 2" } else { "" };
                 writeln!(to, "  replay: plainsight run --scene {file}{}{twice}", choice.flags())?;
             }
-            // The scene file stands alone, but no flag of `run` sets a policy of `full`.
-            Some(_) => writeln!(
+            // The scene file stands alone, but no flag of `run` sets these.
+            needed => writeln!(
                 to,
-                "  replay: {} (fails by the policy of full alone, for which run has no flags)",
-                replay(self.args, seed)
+                "  replay: {} (fails by {} alone, for which run has no flags)",
+                replay(self.args, seed),
+                needed.join(", ")
             )?,
         }
         Ok(())
@@ -365,7 +369,9 @@ impl Sweep<'_> {
         let plain = |seed: u64, culler: CullerKind| Choice {
             frames: 3,
             viewport: Viewport { width: 97, height: 61 },
-            device: Device::Sim,
+            device: Device::Plain(Source::Sim),
+            scale: 1.0,
+            memory: None,
             ..Choice::of(seed, &[culler], &[])
         };
         let seed = (0..CANARIES)
@@ -568,6 +574,16 @@ fn conclude(
     for (probe, count) in tally.probes().into_iter().filter(|&(_, count)| said(count)) {
         writeln!(to, "  {count:>9}  {probe}")?;
     }
+    if tally.worlds > 1 {
+        let members = tally.members();
+        let said = members.iter().take(RAREST).map(|(count, member)| format!("{member} {count}"));
+        let said = said.collect::<Vec<_>>().join(", ");
+        writeln!(to, "rarest of {} members: {said}", members.len())?;
+        let pairs = tally.pairs();
+        let said = pairs.iter().take(RAREST).map(|(n, [a, b])| format!("{a} with {b} {n}"));
+        let said = said.collect::<Vec<_>>().join(", ");
+        writeln!(to, "rarest of {} pairs: {said}", pairs.len())?;
+    }
     let mut worst = |what: &str, outcome: &Option<Outcome>, figure: &dyn Fn(&Outcome) -> f64| {
         outcome.as_ref().map_or(Ok(()), |o| {
             writeln!(
@@ -591,12 +607,14 @@ fn conclude(
         failure.failures.iter().try_for_each(|line| writeln!(to, "  {line}"))?;
         writeln!(to, "  replay: {}", failure.replay)?;
     }
-    let never = tally.never_reached();
+    let (never, rare) = (tally.never_reached(), tally.rare());
     if every_probe {
         never.iter().try_for_each(|probe| writeln!(to, "NEVER REACHED: {probe}"))?;
+        rare.iter().try_for_each(|line| writeln!(to, "TOO RARE: {line}"))?;
     }
     missing.iter().try_for_each(|what| writeln!(to, "MISSING: {what}"))?;
-    let ruling = if every_probe && !never.is_empty() { Ruling::Failed } else { tally.ruling };
+    let reached = never.is_empty() && rare.is_empty();
+    let ruling = if every_probe && !reached { Ruling::Failed } else { tally.ruling };
     let word = match (ruling, missing) {
         (Ruling::Held, [_, ..]) if partial => "held as far as it goes",
         (Ruling::Held, [_, ..]) => "incomplete; --partial judges what is there",

@@ -22,10 +22,10 @@
 //!
 //! Parts are asked about by their several boxes. It loses to `full` where the model is wrong.
 
-use super::layers::next_layer;
+use super::layers::{FIRST_LAYER, next_layer};
 use super::opened::{NO_PARENT, OpenedNodes};
 use super::scenery::{Appearance, NodeHistory};
-use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View};
+use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, Situation, View};
 use crate::index::NodeId;
 use crate::math::Aabb;
 use crate::oracle::{CostModel, OracleError, Proxy};
@@ -45,8 +45,8 @@ const DRAIN: f64 = 0.1;
 /// model knows a mean price; in a near view of the plant leaving out a third of the triangles, all
 /// hidden, saved a tenth of the time.
 const SURELY_SAVED: f64 = 0.6;
-/// Levels of unknown nodes that are gone down between two batches where a node in view was opened: a
-/// batch costs as much as many questions.
+/// Levels of unknown nodes that are gone down between two batches where a node in view was opened, where
+/// nothing else is said: a batch costs as much as many questions.
 const LEVELS_A_BATCH: u32 = 2;
 /// Share of a part's work that asking about several boxes in the place of one may cost: against sixteen
 /// boxes a tenth to a quarter of the parts that one box lets pass are hidden (see `part::boxes`).
@@ -55,6 +55,31 @@ const TIGHTNESS: f64 = 0.1;
 const ASSUMED_ANSWERS: f64 = 8.0;
 /// What is left of an answer's weight a frame later.
 const MEMORY: f64 = 0.75;
+
+/// What can be tuned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AdaptiveKnobs {
+    /// Nodes that nothing is known of which the first batch asks about, at least 1; later batches ask about as
+    /// many as parts are drawn.
+    pub first_layer: usize,
+    /// Levels of unknown nodes that are gone down between two batches.
+    pub levels_a_batch: u32,
+    /// Share of the work of what was visible last time that is drawn unasked, from 0 to 1.
+    pub unasked: f64,
+    /// Share of the cost of frustum culling that questions may waste in a frame, at least 0.
+    pub allowance: f64,
+}
+
+impl Default for AdaptiveKnobs {
+    fn default() -> Self {
+        Self {
+            first_layer: FIRST_LAYER,
+            levels_a_batch: LEVELS_A_BATCH,
+            unasked: UNASKED,
+            allowance: ALLOWANCE,
+        }
+    }
+}
 
 /// What is known of a node before it is asked about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,14 +193,15 @@ impl Account {
     }
 
     /// What the next batch may cost.
-    fn purse(&self) -> f64 {
-        ALLOWANCE * self.everything + SURELY_SAVED * self.saved - self.asked
+    fn purse(&self, allowance: f64) -> f64 {
+        allowance * self.everything + SURELY_SAVED * self.saved - self.asked
     }
 }
 
 /// The adaptive culler.
 pub struct Adaptive {
     scenery: Scenery,
+    knobs: AdaptiveKnobs,
     model: CostModel,
     history: Vec<History>,
     shows: Odds,
@@ -193,12 +219,16 @@ pub struct Adaptive {
 
 impl Adaptive {
     /// Over the index and partition of `setup`, by its cost model.
+    ///
+    /// # Panics
+    /// If a layer has no node.
     #[must_use]
-    pub fn new(setup: CullerSetup) -> Self {
+    pub fn new(setup: CullerSetup, knobs: AdaptiveKnobs) -> Self {
+        assert!(knobs.first_layer > 0, "a layer has at least one node");
         let model = setup.cost.clone();
-        let knobs = SceneryKnobs { tighten: true, treeless_items: true };
         Self {
-            scenery: Scenery::new(setup, knobs),
+            scenery: Scenery::new(setup, SceneryKnobs { tighten: true, treeless_items: true }),
+            knobs,
             model,
             history: Vec::new(),
             // What was visible mostly stays so and what was hidden too; of the rest nothing is known.
@@ -358,7 +388,7 @@ impl Adaptive {
     fn pick(&mut self, view: &View<'_>, pending: Vec<Pending>, due: bool) -> Option<Batch> {
         self.proxies.clear();
         let trip = self.model.trip_ns;
-        let mut purse = self.account.purse() - trip;
+        let mut purse = self.account.purse(self.knobs.allowance) - trip;
         // Nothing is left to draw after a batch about what is drawn.
         let mut gain = -trip - if pending.is_empty() { 0.0 } else { self.account.drain() };
         let mut valued: Vec<(f64, Question, Pending)> = Vec::with_capacity(pending.len());
@@ -408,6 +438,9 @@ impl Adaptive {
     ) -> Result<(), OracleError> {
         let asked = batch.asked.iter().map(|(question, pending)| (question, pending.item));
         let due = batch.due.iter().map(|(question, drawn)| (question, drawn.item));
+        if !batch.later.is_empty() {
+            pen.reached(Situation::PurseEmpty);
+        }
         for (question, item) in asked.chain(due) {
             pen.ask_about([item], &self.proxies[question.proxies.clone()]);
             self.account.asked += question.price;
@@ -445,7 +478,7 @@ impl Adaptive {
 
     /// Goes some levels down through new nodes below one that shows.
     fn descend(&mut self, view: &View<'_>, pen: &mut Pen<'_>) {
-        for _ in 0..LEVELS_A_BATCH {
+        for _ in 0..self.knobs.levels_a_batch {
             for (item, parent) in std::mem::take(&mut self.stack) {
                 let history = self.history[self.scenery.slot(item)];
                 let known = history.visible_after.max(history.hidden_after) >= view.frame.max(1);
@@ -493,7 +526,11 @@ impl Adaptive {
                 continue;
             }
             let new_depth = |p: &Pending| (p.kind == Kind::New).then_some(p.depth);
-            let (layer, mut farther) = next_layer(unknown, self.drawn_parts, new_depth);
+            let most = (self.knobs.first_layer, self.drawn_parts);
+            let (layer, mut farther) = next_layer(unknown, most, new_depth);
+            if !farther.is_empty() {
+                pen.reached(Situation::LayerWaits);
+            }
             let Some(mut batch) = self.pick(view, layer, true) else {
                 let these = std::mem::take(&mut self.pending);
                 self.open_all(view, pen, these);
@@ -548,7 +585,7 @@ impl Culler for Adaptive {
         self.account.everything += self.pending.iter().map(|p| p.work_ns).sum::<f64>();
         let showing = self.pending.iter().filter(|p| p.kind == Kind::Shows);
         let showing: f64 = showing.map(|p| p.work_ns).sum();
-        self.draw_nearest(view, pen, showing * UNASKED);
+        self.draw_nearest(view, pen, showing * self.knobs.unasked);
         // As much work as a round trip costs, so that the first batch has something to ask against.
         self.find_nearest(view, pen, self.model.trip_ns);
         self.batches(view, pen)?;

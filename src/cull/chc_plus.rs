@@ -13,17 +13,27 @@
 use super::opened::{NO_PARENT, OpenedNodes};
 use super::postponement::scatter;
 use super::scenery::{Appearance, NodeHistory};
-use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View, group};
+use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, Situation, View, group};
 use crate::index::NodeId;
 use crate::math::Aabb;
 use crate::oracle::{OracleError, Proxy};
 
-/// Frames for which a visible part is assumed visible (the paper's n_av).
-const ASSUMED_VISIBLE: u32 = 10;
-/// Invisible nodes queued before they are asked about (the paper's b).
-const BATCH: usize = 20;
-/// Most nodes in one question.
-const MOST_TOGETHER: usize = 16;
+/// What can be tuned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChcPlusKnobs {
+    /// Frames for which a visible part is assumed visible (the paper's n_av), at least 1.
+    pub assumed_visible: u32,
+    /// Invisible nodes queued before they are asked about (the paper's b), at least 1.
+    pub batch: usize,
+    /// Most nodes in one question, at least 1.
+    pub most_together: usize,
+}
+
+impl Default for ChcPlusKnobs {
+    fn default() -> Self {
+        Self { assumed_visible: 10, batch: 20, most_together: 16 }
+    }
+}
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct History {
@@ -54,6 +64,7 @@ struct Node {
 /// CHC++.
 pub struct ChcPlus {
     scenery: Scenery,
+    knobs: ChcPlusKnobs,
     history: Vec<History>,
     opened: OpenedNodes,
     /// Invisible nodes not yet asked about.
@@ -64,11 +75,18 @@ pub struct ChcPlus {
 
 impl ChcPlus {
     /// Over the index and partition of `setup`.
+    ///
+    /// # Panics
+    /// If a part is assumed visible for no frame, or no node may be queued or stand in a question.
     #[must_use]
-    pub fn new(setup: CullerSetup) -> Self {
+    pub fn new(setup: CullerSetup, knobs: ChcPlusKnobs) -> Self {
+        assert!(knobs.assumed_visible > 0, "a part is asked about at most once a frame");
+        assert!(knobs.batch > 0, "a batch holds at least one node");
+        assert!(knobs.most_together > 0, "a question is about at least one node");
         let scenery = Scenery::new(setup, SceneryKnobs { tighten: true, treeless_items: true });
         Self {
             scenery,
+            knobs,
             history: Vec::new(),
             opened: OpenedNodes::default(),
             queued: Vec::new(),
@@ -83,7 +101,10 @@ impl ChcPlus {
         let chances: Vec<f64> = queued.iter().map(|node| node.chance).collect();
         let mut start = 0;
         let mut rest = queued.into_iter();
-        for end in group::runs(&chances, MOST_TOGETHER) {
+        for end in group::runs(&chances, self.knobs.most_together) {
+            if end - start == self.knobs.most_together && end - start > 1 {
+                pen.reached(Situation::GroupFull);
+            }
             let nodes: Vec<Node> = rest.by_ref().take(end - start).collect();
             let proxies: Vec<Proxy> = nodes.iter().flat_map(|n| n.proxies.clone()).collect();
             pen.ask_about(nodes.iter().map(|node| node.item), &proxies);
@@ -117,7 +138,8 @@ impl ChcPlus {
                 let mut proxies = Vec::new();
                 self.scenery.tighter_proxies(view, item, proxy, &mut proxies);
                 self.queued.push(node(proxies, parent, chance));
-                if self.queued.len() >= BATCH {
+                if self.queued.len() >= self.knobs.batch {
+                    pen.reached(Situation::BatchFull);
                     self.ask_queued(pen);
                 }
             }
@@ -125,7 +147,7 @@ impl ChcPlus {
                 let place = self.opened.open(&self.scenery, view, pen, (item, parent), stack);
                 // A hash for the random phase; the node's number decides.
                 let phase = scatter(slot) >> 16;
-                if (view.frame + phase).is_multiple_of(ASSUMED_VISIBLE) {
+                if (view.frame + phase).is_multiple_of(self.knobs.assumed_visible) {
                     due.push(node(vec![proxy], place, 0.0));
                 } else {
                     self.opened.show(place);

@@ -28,7 +28,7 @@
 
 use std::marker::PhantomData;
 
-use super::layers::next_layer;
+use super::layers::{FIRST_LAYER, next_layer};
 use super::opened::{NO_PARENT, OpenedNodes};
 use super::postponement::scatter;
 use super::scenery::{Appearance, NodeHistory};
@@ -71,6 +71,9 @@ pub struct FullKnobs {
     pub after_group: AfterGroup,
     /// Most boxes by which a part is asked about, at least 1.
     pub most_boxes: usize,
+    /// Nodes that nothing is known of which the first batch asks about, at least 1; later batches ask about as
+    /// many as parts are drawn.
+    pub first_layer: usize,
     /// Whether to take tightened boxes.
     pub tighten: bool,
 }
@@ -95,6 +98,7 @@ impl Default for FullKnobs {
             most_together: 16,
             after_group: AfterGroup::default(),
             most_boxes: MOST_BOXES,
+            first_layer: FIRST_LAYER,
             tighten: true,
         }
     }
@@ -203,7 +207,7 @@ impl Full {
     /// Over the index and partition of `setup`.
     ///
     /// # Panics
-    /// If no question may be in flight, or none may stand in one, or a part has no box.
+    /// If no question may be in flight, or none may stand in one, or a part has no box, or a layer no node.
     #[must_use]
     pub fn new(setup: CullerSetup, knobs: FullKnobs) -> Self {
         Self::by_rules(setup, knobs)
@@ -220,6 +224,7 @@ impl<R: HistoryRules> Full<R> {
         assert!(knobs.most_in_flight > 0, "at least one question must be in flight");
         assert!(knobs.most_together > 0, "a question is about at least one node");
         assert!(knobs.most_boxes > 0, "a part is asked about by at least one box");
+        assert!(knobs.first_layer > 0, "a layer has at least one node");
         let scenery_knobs = SceneryKnobs { tighten: knobs.tighten, treeless_items: true };
         let scenery = Scenery::new(setup, scenery_knobs);
         let (history, frame, rules) = (Vec::new(), Frame::default(), PhantomData);
@@ -335,7 +340,7 @@ impl<R: HistoryRules> Full<R> {
 
     /// One batch of questions about candidates and due nodes; what shows is walked.
     fn batch(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
-        let mut groups = self.next_groups();
+        let mut groups = self.next_groups(pen);
         self.frame.groups = groups.split_off(self.knobs.most_in_flight.min(groups.len()));
         for group in &groups {
             self.frame.proxies.clear();
@@ -346,6 +351,9 @@ impl<R: HistoryRules> Full<R> {
         }
         let room = self.knobs.most_in_flight - groups.len();
         let later = self.frame.due.split_off(room.min(self.frame.due.len()));
+        if !(self.frame.groups.is_empty() && later.is_empty()) {
+            pen.reached(Situation::BatchFull);
+        }
         let due = std::mem::replace(&mut self.frame.due, later);
         for part in &due {
             self.frame.proxies.clear();
@@ -379,17 +387,24 @@ impl<R: HistoryRules> Full<R> {
     }
 
     /// What is left of groups, and groups of the candidates whose turn it is.
-    fn next_groups(&mut self) -> Vec<Group> {
+    fn next_groups(&mut self, pen: &mut Pen<'_>) -> Vec<Group> {
         let mut groups = std::mem::take(&mut self.frame.groups);
         let candidates = std::mem::take(&mut self.frame.candidates);
         let new_depth = |c: &Candidate| c.chance.is_none().then_some(c.depth);
-        let (candidates, later) = next_layer(candidates, self.frame.drawn_parts, new_depth);
+        let most = (self.knobs.first_layer, self.frame.drawn_parts);
+        let (candidates, later) = next_layer(candidates, most, new_depth);
+        if !later.is_empty() {
+            pen.reached(Situation::LayerWaits);
+        }
         self.frame.candidates = later;
         let unknown = group::chance_of_staying_hidden(0);
         let chances: Vec<f64> = candidates.iter().map(|c| c.chance.unwrap_or(unknown)).collect();
         let (mut candidates, mut start) = (candidates.into_iter(), 0);
         for end in group::runs(&chances, self.knobs.most_together) {
             let nodes = candidates.by_ref().take(end - start).collect();
+            if end - start == self.knobs.most_together && end - start > 1 {
+                pen.reached(Situation::GroupFull);
+            }
             groups.push(Group { nodes, ..Group::default() });
             start = end;
         }

@@ -19,7 +19,7 @@
 //! had no such price.
 
 use super::scenery::{Appearance, NodeHistory};
-use super::{Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, View};
+use super::{Culler, CullerSetup, Item, Pen, Postponement, Scenery, SceneryKnobs, Situation, View};
 use crate::index::NodeId;
 use crate::math::{Aabb, PixelRectangle};
 use crate::oracle::{OracleError, QueryId};
@@ -165,6 +165,9 @@ impl FullWaits {
                     First::NeedQuery(rectangle, proxy) => (rectangle, proxy),
                 },
             };
+            if asked == self.knobs.most_in_flight {
+                pen.reached(Situation::BatchFull);
+            }
             let free = asked < self.knobs.most_in_flight
                 && !taken.iter().any(|other| other.overlaps(&rectangle));
             taken.push(rectangle);

@@ -1,18 +1,20 @@
 //! Layers: nodes that nothing is known of, as in a first frame or after a turn, are asked about the
 //! nearest first. They hide the others, which would be asked about in vain.
 
-/// Nodes that nothing is known of which a batch asks about where hardly anything is drawn.
-const FIRST_LAYER: usize = 64;
+/// Nodes that nothing is known of which a batch asks about where hardly anything is drawn, where nothing else
+/// is said.
+pub(super) const FIRST_LAYER: usize = 64;
 
 /// Parts `nodes` into those of the next batch and those that stay for later, both in their order.
 /// `new_depth`: how near a node can be that nothing is known of, `None` for others, which never stay.
-/// A batch takes as many new nodes as parts are drawn, so that layers double.
+/// A batch takes as many new nodes as parts are drawn, and at least `first` (at least 1), so that layers
+/// double.
 pub(super) fn next_layer<T>(
     mut nodes: Vec<T>,
-    drawn_parts: usize,
+    (first, drawn_parts): (usize, usize),
     new_depth: impl Fn(&T) -> Option<f32>,
 ) -> (Vec<T>, Vec<T>) {
-    let most = FIRST_LAYER.max(drawn_parts);
+    let most = first.max(drawn_parts);
     let mut depths: Vec<f32> = nodes.iter().filter_map(&new_depth).collect();
     if depths.len() <= most {
         return (nodes, Vec::new());
@@ -33,17 +35,17 @@ mod tests {
         let nodes: Vec<(u32, bool)> =
             (0..100).flat_map(|i| [(i * 37 % 100, true), (i, false)]).collect();
         let depth = |&(depth, new): &(u32, bool)| new.then_some(depth as f32);
-        let (now, later) = next_layer(nodes.clone(), 0, depth);
+        let (now, later) = next_layer(nodes.clone(), (FIRST_LAYER, 0), depth);
         assert_eq!((now.len(), later.len()), (164, 36));
         assert!(now.iter().all(|&(depth, new)| !new || depth < 64));
         assert!(later.iter().all(|&(depth, new)| new && depth >= 64));
-        let (now, later) = next_layer(nodes.clone(), 100, depth);
+        let (now, later) = next_layer(nodes.clone(), (FIRST_LAYER, 100), depth);
         assert_eq!((now, later), (nodes, Vec::new()));
     }
 
     #[test]
     fn equally_near_ones_go_together() {
-        let (now, later) = next_layer(vec![1.0; 200], 0, |&depth| Some(depth));
+        let (now, later) = next_layer(vec![1.0; 200], (FIRST_LAYER, 0), |&depth| Some(depth));
         assert_eq!((now.len(), later.len()), (200, 0));
     }
 }

@@ -30,9 +30,9 @@ use crate::math::Aabb;
 use crate::oracle::{CostModel, OracleError};
 use crate::part::Partition;
 
-pub use adaptive::Adaptive;
+pub use adaptive::{Adaptive, AdaptiveKnobs};
 pub use chc::Chc;
-pub use chc_plus::ChcPlus;
+pub use chc_plus::{ChcPlus, ChcPlusKnobs};
 pub use draw_all::DrawAll;
 pub use event::{Asked, Event};
 pub use full::{AfterGroup, Full, FullKnobs};
@@ -40,7 +40,7 @@ pub use full_waits::{FullWaits, FullWaitsKnobs};
 pub use journal::{Journal, Question};
 pub use pen::{Counts, Finished, Pen};
 pub use per_view::PerView;
-pub use pipelined::Pipelined;
+pub use pipelined::{Pipelined, PipelinedKnobs};
 pub use postponement::Postponement;
 pub use scenery::{Appearance, Item, NodeHistory, Scenery, SceneryKnobs, Weight};
 pub use simple::Simple;
@@ -163,7 +163,7 @@ pub const CULLERS: &[CullerKind] = &[
         name: "full-adaptive",
         summary: "full, weighing every question by a cost model (--cost): never far over vfc",
         asks: true,
-        make: |setup| Box::new(Adaptive::new(setup)),
+        make: |setup| Box::new(Adaptive::new(setup, AdaptiveKnobs::default())),
     },
     CullerKind {
         name: "full-trusting",
@@ -187,13 +187,13 @@ pub const CULLERS: &[CullerKind] = &[
         name: "chc++",
         summary: "CHC++, Mattausch et al. 2008: several nodes in a question, visible parts asked seldom",
         asks: true,
-        make: |setup| Box::new(ChcPlus::new(setup)),
+        make: |setup| Box::new(ChcPlus::new(setup, ChcPlusKnobs::default())),
     },
     CullerKind {
         name: "pipelined",
         summary: "simple with several batches of questions on their way at once",
         asks: true,
-        make: |setup| Box::new(Pipelined::new(setup)),
+        make: |setup| Box::new(Pipelined::new(setup, PipelinedKnobs::default())),
     },
     CullerKind {
         name: "draw-all",

@@ -197,7 +197,8 @@ impl<'a> Pen<'a> {
             let question = self
                 .journal
                 .as_mut()
-                .and_then(|j| j.questions.iter_mut().find(|q| q.query == answer.query));
+                .and_then(|j| j.questions.get_mut(answer.query.0 as usize))
+                .filter(|question| question.query == answer.query);
             if let Some(question) = question {
                 question.visible = Some(answer.visible);
             }

@@ -3,7 +3,7 @@
 //! queue so that neither side waits for the other. No history: what is asked is asked in every frame.
 //!
 //! 1. Nodes are taken from the stack, the nearer first. One that must be asked about joins the open batch.
-//! 2. A full batch is sent. With [`MOST_BATCHES`] on their way the oldest is waited for; the visible nodes in
+//! 2. A full batch is sent. With [`PipelinedKnobs::most_batches`] on their way the oldest is waited for; the visible nodes in
 //!    it are opened and their contents drawn.
 //! 3. With nothing left on the stack the open batch is sent, and the oldest waited for.
 //!
@@ -14,26 +14,42 @@
 use std::collections::VecDeque;
 
 use super::scenery::Appearance;
-use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, View};
+use super::{Culler, CullerSetup, Item, Pen, Scenery, SceneryKnobs, Situation, View};
 use crate::index::NodeId;
 use crate::math::Aabb;
 use crate::oracle::OracleError;
 
-/// Questions in a batch.
-const BATCH: usize = 16;
-/// Batches on their way before the oldest is waited for.
-const MOST_BATCHES: usize = 4;
+/// What can be tuned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PipelinedKnobs {
+    /// Questions in a batch, at least 1.
+    pub batch: usize,
+    /// Batches on their way before the oldest is waited for, at least 1.
+    pub most_batches: usize,
+}
+
+impl Default for PipelinedKnobs {
+    fn default() -> Self {
+        Self { batch: 16, most_batches: 4 }
+    }
+}
 
 /// Occlusion culling with a queue of batches.
 pub struct Pipelined {
     scenery: Scenery,
+    knobs: PipelinedKnobs,
 }
 
 impl Pipelined {
     /// Over the index and partition of `setup`.
+    ///
+    /// # Panics
+    /// If a batch holds no question, or no batch may be on its way.
     #[must_use]
-    pub fn new(setup: CullerSetup) -> Self {
-        Self { scenery: Scenery::new(setup, SceneryKnobs::default()) }
+    pub fn new(setup: CullerSetup, knobs: PipelinedKnobs) -> Self {
+        assert!(knobs.batch > 0, "a batch holds at least one question");
+        assert!(knobs.most_batches > 0, "at least one batch must be on its way");
+        Self { scenery: Scenery::new(setup, SceneryKnobs::default()), knobs }
     }
 }
 
@@ -48,7 +64,7 @@ impl Culler for Pipelined {
         let (mut next, mut answers) = (Vec::new(), Vec::new());
         let (mut open, mut sent) = (Vec::new(), VecDeque::new());
         loop {
-            while sent.len() < MOST_BATCHES
+            while sent.len() < self.knobs.most_batches
                 && let Some(item) = stack.pop()
             {
                 match self.scenery.appearance(view, item) {
@@ -62,7 +78,7 @@ impl Culler for Pipelined {
                         open.push(item);
                     }
                 }
-                if open.len() == BATCH {
+                if open.len() == self.knobs.batch {
                     pen.send()?;
                     sent.push_back(std::mem::take(&mut open));
                 }
@@ -70,6 +86,9 @@ impl Culler for Pipelined {
             if stack.is_empty() && !open.is_empty() {
                 pen.send()?;
                 sent.push_back(std::mem::take(&mut open));
+            }
+            if sent.len() == self.knobs.most_batches && !stack.is_empty() {
+                pen.reached(Situation::QueueFull);
             }
             let Some(batch) = sent.pop_front() else { break };
             answers.clear();

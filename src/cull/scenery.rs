@@ -149,6 +149,18 @@ impl Scenery {
         }) as usize
     }
 
+    /// The largest error that counts for anything at or below a node of the index, in the latest frame.
+    #[must_use]
+    pub fn node_error(&self, node: NodeId) -> ClipError {
+        self.node_error[node.0 as usize]
+    }
+
+    /// Whether objects without a tree are items of their own; else they are drawn with their node.
+    #[must_use]
+    pub fn treeless_items(&self) -> bool {
+        self.knobs.treeless_items
+    }
+
     /// Notes what became of the scene tree in this frame.
     pub(super) fn note_update(&self, pen: &mut Pen<'_>) {
         if !self.index.rebuilt().is_empty() {
@@ -373,8 +385,8 @@ impl Scenery {
     }
 
     /// What to ask about in the place of `proxy`, that of a part: the part's several boxes, neighbours
-    /// taken together until there are at most `most`. For what is no part, as `tighter_proxies`.
-    pub(super) fn tightest_proxies(
+    /// taken together until there are at most `most`. For what is no part, boxes some levels below it.
+    pub fn tightest_proxies(
         &self,
         view: &View<'_>,
         item: Item,

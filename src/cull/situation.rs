@@ -31,11 +31,21 @@ pub enum Situation {
     Rebuilt,
     /// An object went from one side of the scene tree's root to the other.
     CrossedRoot,
+    /// There was more to ask about than a batch holds.
+    BatchFull,
+    /// As many nodes stand in one question as may.
+    GroupFull,
+    /// Nodes that nothing is known of wait for a later batch.
+    LayerWaits,
+    /// As many batches are on their way as may be, and the walk waits.
+    QueueFull,
+    /// A question that would pay is not asked: its frame has spent what it may.
+    PurseEmpty,
 }
 
 impl Situation {
     /// All there are.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 17] = [
         Self::AnsweredHidden,
         Self::AnsweredVisible,
         Self::SeveralHidden,
@@ -48,6 +58,11 @@ impl Situation {
         Self::Unprojectable,
         Self::Rebuilt,
         Self::CrossedRoot,
+        Self::BatchFull,
+        Self::GroupFull,
+        Self::LayerWaits,
+        Self::QueueFull,
+        Self::PurseEmpty,
     ];
 }
 
@@ -66,6 +81,11 @@ impl fmt::Display for Situation {
             Self::Unprojectable => "the near plane cut a query box",
             Self::Rebuilt => "the scene tree was rebuilt",
             Self::CrossedRoot => "a relink crossed the root",
+            Self::BatchFull => "there was more to ask about than a batch holds",
+            Self::GroupFull => "a question was about as many nodes as may be",
+            Self::LayerWaits => "nodes of a layer waited for the next batch",
+            Self::QueueFull => "the walk waited for the oldest of a full queue of batches",
+            Self::PurseEmpty => "a question that pays was beyond the frame's purse",
         })
     }
 }

@@ -81,6 +81,36 @@ impl Checklists {
         }
     }
 
+    /// Whether the object is in the list of the update that it is due by, and due in time: it is `distance`
+    /// from where it may leave its place, goes at most `step` a frame, and neither may be off by more than
+    /// `rounding`. To be asked between updates.
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub(super) fn check(
+        &self,
+        (id, due): (ObjectId, Due),
+        (distance, step, rounding): (f64, f64, f64),
+    ) -> Result<(), String> {
+        if step <= 0.0 {
+            return Ok(());
+        }
+        let Due(update) = due;
+        let ahead = self.lists.len() as u32;
+        if update <= self.now || update - self.now >= ahead {
+            return Err(format!("object {} is due by no update to come", id.0));
+        }
+        if !self.lists[(update % ahead) as usize].contains(&id) {
+            return Err(format!("object {} is not in the list that it is due by", id.0));
+        }
+        // It is looked at after the updates before that one have passed.
+        let unseen = f64::from(update - self.now - 1) * step;
+        if unseen > distance.max(0.0) + rounding {
+            return Err(format!("object {} may leave its place before it is looked at", id.0));
+        }
+        Ok(())
+    }
+
     /// Bytes on the heap.
     pub(super) fn heap_bytes(&self) -> usize {
         let lists: usize = self.lists.iter().map(|list| list.capacity() * 4).sum();

@@ -39,8 +39,6 @@ const LARGEST: f64 = 0.5;
 const CLIMB: u8 = 2;
 /// Levels above the deepest that it could be at, where an object is at first.
 const FIRST: u8 = 3;
-/// Updates ahead that can be foreseen.
-const AHEAD: u32 = 4096;
 /// Objects that are due whose memory is read ahead of the decisions, so that the reads overlap.
 const READ_AHEAD: usize = 32;
 
@@ -153,7 +151,7 @@ impl LazyGrid {
             counts: vec![0; count as usize],
             homes: entries.iter().map(home).collect(),
             deepest,
-            lists: Checklists::new(AHEAD),
+            lists: Checklists::new(knobs.ahead),
             strays: Vec::new(),
             rebuilt: Vec::new(),
             work: Work::default(),
@@ -582,6 +580,24 @@ impl Index for LazyGrid {
                 }
             }
         }
-        each_once(&seen)
+        each_once(&seen)?;
+        for id in (0..boxes.len() as u32).map(ObjectId) {
+            let (home, bounds) = (self.homes[id.0 as usize], &boxes[id.0 as usize]);
+            if bounds.is_empty() {
+                continue;
+            }
+            let room = self.room(home.cell, bounds.center());
+            let stray = self.strays.binary_search(&id).is_ok();
+            if stray && home.cell != 0 {
+                return Err(format!("object {} is a stray and not in the first cell", id.0));
+            }
+            if home.cell == 0 && stray != (room < 0.0) {
+                return Err(format!("object {} is a stray: {stray}", id.0));
+            }
+            let far = bounds.max_abs().max(self.space.max_abs()).max_element();
+            let known = (room, f64::from(home.step), far * MIDDLE_ROUNDING);
+            self.lists.check((id, home.due), known)?;
+        }
+        Ok(())
     }
 }

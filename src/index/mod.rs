@@ -10,6 +10,7 @@ mod lazy_grid;
 mod list;
 mod loose_octree;
 mod octree;
+mod promises;
 mod regular_grid;
 mod temporal_volumes;
 mod tree;
@@ -25,12 +26,13 @@ use crate::math::{Aabb, Meets, Volume};
 use crate::part::ObjectId;
 
 pub use bucket_octree::{bounds_octree, extents_octree, radius_octree};
-pub use grid_knobs::GridKnobs;
+pub use grid_knobs::{BspKnobs, GridKnobs, VolumeKnobs};
 pub use irregular_octree::IrregularOctree;
 pub use lazy_grid::LazyGrid;
 pub use list::List;
 pub use loose_octree::{LooseKnobs, loose_octree};
 pub use octree::{octree, overlapping_octree};
+pub use promises::{Shape, missed, promises};
 pub use regular_grid::RegularGrid;
 pub use temporal_volumes::TemporalVolumes;
 pub use tree_knobs::{Split, TreeKnobs};
@@ -261,6 +263,28 @@ pub trait Index {
     fn check(&self, boxes: &[Aabb]) -> Result<(), String>;
 }
 
+/// Knobs for any index; each takes those that it has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IndexKnobs {
+    /// Of the trees, whose split is their own.
+    pub tree: TreeKnobs,
+    /// Of Octree 4.
+    pub loose: LooseKnobs,
+    /// Of the grids.
+    pub grid: GridKnobs,
+    /// Of the scene tree.
+    pub bsp: BspKnobs,
+    /// Of temporal bounding volumes.
+    pub volumes: VolumeKnobs,
+}
+
+impl IndexKnobs {
+    /// The trees' knobs with that split.
+    fn tree(&self, split: Split) -> TreeKnobs {
+        TreeKnobs { split, ..self.tree }
+    }
+}
+
 /// A member of the family.
 #[derive(Clone, Copy, Debug)]
 pub struct IndexKind {
@@ -270,10 +294,19 @@ pub struct IndexKind {
     pub summary: &'static str,
     /// Builds it over the objects of frame 0; the place in the slice is the object's id.
     pub build: fn(&[Entry]) -> Box<dyn Index>,
+    /// Builds it by other knobs.
+    pub with: fn(&[Entry], &IndexKnobs) -> Box<dyn Index>,
 }
 
 /// Levels that the members of the register leave to finding, where they do.
 const REDUCTION: u8 = 2;
+
+/// The same knobs, reduced by [`REDUCTION`] levels where they leave nothing to finding.
+fn lazy(knobs: TreeKnobs) -> TreeKnobs {
+    let depth_reduction =
+        if knobs.depth_reduction == 0 { REDUCTION } else { knobs.depth_reduction };
+    TreeKnobs { depth_reduction, checklists: true, ..knobs }
+}
 
 /// Knobs for any scene.
 fn usual(split: Split, entries: &[Entry]) -> TreeKnobs {
@@ -286,56 +319,67 @@ pub const INDEXES: &[IndexKind] = &[
         name: "two-level-bsp",
         summary: "the scene tree of Kovalčík & Sochor 2006: axis-aligned, objects in inner nodes too",
         build: |entries| Box::new(TwoLevelBsp::new(entries)),
+        with: |entries, knobs| Box::new(TwoLevelBsp::with(entries, knobs.bsp)),
     },
     IndexKind {
         name: "list",
         summary: "one node that holds everything",
         build: |entries| Box::new(List::new(entries)),
+        with: |entries, _| Box::new(List::new(entries)),
     },
     IndexKind {
         name: "octree",
         summary: "Octree 1 of Wortel 2011: each object at the smallest node that holds it",
         build: |entries| octree(entries, usual(Split::Octants, entries)),
+        with: |entries, knobs| octree(entries, knobs.tree(Split::Octants)),
     },
     IndexKind {
         name: "quadtree",
         summary: "the same over the ground",
         build: |entries| octree(entries, usual(Split::Quadrants, entries)),
+        with: |entries, knobs| octree(entries, knobs.tree(Split::Quadrants)),
     },
     IndexKind {
         name: "overlapping-octree",
         summary: "Octree 2 of Wortel 2011: nodes larger than their space",
         build: |entries| overlapping_octree(entries, usual(Split::Octants, entries)),
+        with: |entries, knobs| overlapping_octree(entries, knobs.tree(Split::Octants)),
     },
     IndexKind {
         name: "overlapping-quadtree",
         summary: "the same over the ground",
         build: |entries| overlapping_octree(entries, usual(Split::Quadrants, entries)),
+        with: |entries, knobs| overlapping_octree(entries, knobs.tree(Split::Quadrants)),
     },
     IndexKind {
         name: "bounds-octree",
         summary: "Octree 3 of Wortel 2011: buckets, nodes as large as their contents",
         build: |entries| bounds_octree(entries, usual(Split::Octants, entries)),
+        with: |entries, knobs| bounds_octree(entries, knobs.tree(Split::Octants)),
     },
     IndexKind {
         name: "bounds-quadtree",
         summary: "the same over the ground",
         build: |entries| bounds_octree(entries, usual(Split::Quadrants, entries)),
+        with: |entries, knobs| bounds_octree(entries, knobs.tree(Split::Quadrants)),
     },
     IndexKind {
         name: "extents-octree",
         summary: "Octree 3b of Wortel 2011: buckets, nodes as large as their largest object asks",
         build: |entries| extents_octree(entries, usual(Split::Octants, entries)),
+        with: |entries, knobs| extents_octree(entries, knobs.tree(Split::Octants)),
     },
     IndexKind {
         name: "extents-quadtree",
         summary: "the same over the ground",
         build: |entries| extents_octree(entries, usual(Split::Quadrants, entries)),
+        with: |entries, knobs| extents_octree(entries, knobs.tree(Split::Quadrants)),
     },
     IndexKind {
         name: "radius-octree",
         summary: "Octree 3bR of Wortel 2011: the same, but for one radius on all axes",
         build: |entries| radius_octree(entries, usual(Split::Octants, entries)),
+        with: |entries, knobs| radius_octree(entries, knobs.tree(Split::Octants)),
     },
     IndexKind {
         name: "radius-quadtree-lazy",
@@ -344,6 +388,7 @@ pub const INDEXES: &[IndexKind] = &[
             let knobs = TreeKnobs { start_depth: 3, ..usual(Split::Quadrants, entries) };
             radius_octree(entries, knobs.reduced(REDUCTION))
         },
+        with: |entries, knobs| radius_octree(entries, lazy(knobs.tree(Split::Quadrants))),
     },
     IndexKind {
         name: "loose-octree",
@@ -351,6 +396,7 @@ pub const INDEXES: &[IndexKind] = &[
         build: |entries| {
             loose_octree(entries, usual(Split::Octants, entries), LooseKnobs::default())
         },
+        with: |entries, knobs| loose_octree(entries, knobs.tree(Split::Octants), knobs.loose),
     },
     IndexKind {
         name: "loose-octree-lazy",
@@ -359,11 +405,13 @@ pub const INDEXES: &[IndexKind] = &[
             let knobs = usual(Split::Octants, entries).reduced(REDUCTION);
             loose_octree(entries, knobs, LooseKnobs::default())
         },
+        with: |entries, knobs| loose_octree(entries, lazy(knobs.tree(Split::Octants)), knobs.loose),
     },
     IndexKind {
         name: "lazy-grid",
         summary: "grids over one another, objects in large cells until somebody looks; this project's own",
         build: |entries| Box::new(LazyGrid::new(entries, GridKnobs::default())),
+        with: |entries, knobs| Box::new(LazyGrid::new(entries, knobs.grid)),
     },
     IndexKind {
         name: "loose-quadtree-lazy",
@@ -371,6 +419,9 @@ pub const INDEXES: &[IndexKind] = &[
         build: |entries| {
             let knobs = usual(Split::Quadrants, entries).reduced(REDUCTION);
             loose_octree(entries, knobs, LooseKnobs::default())
+        },
+        with: |entries, knobs| {
+            loose_octree(entries, lazy(knobs.tree(Split::Quadrants)), knobs.loose)
         },
     },
     IndexKind {
@@ -381,11 +432,13 @@ pub const INDEXES: &[IndexKind] = &[
                 TreeKnobs { max_depth: TreeKnobs::DEEPEST, ..usual(Split::Octants, entries) };
             Box::new(IrregularOctree::new(entries, knobs))
         },
+        with: |entries, knobs| Box::new(IrregularOctree::new(entries, knobs.tree(Split::Octants))),
     },
     IndexKind {
         name: "regular-grid",
         summary: "of Batagelo & Wu 2002: one level of cells",
         build: |entries| Box::new(RegularGrid::new(entries, GridKnobs::default())),
+        with: |entries, knobs| Box::new(RegularGrid::new(entries, knobs.grid)),
     },
     IndexKind {
         name: "temporal-grid",
@@ -394,7 +447,12 @@ pub const INDEXES: &[IndexKind] = &[
             let grid = |held: &[Entry]| -> Box<dyn Index> {
                 Box::new(RegularGrid::new(held, GridKnobs::default()))
             };
-            Box::new(TemporalVolumes::new("temporal-grid", entries, grid))
+            Box::new(TemporalVolumes::new("temporal-grid", VolumeKnobs::default(), entries, grid))
+        },
+        with: |entries, knobs| {
+            let grid =
+                |held: &[Entry]| -> Box<dyn Index> { Box::new(RegularGrid::new(held, knobs.grid)) };
+            Box::new(TemporalVolumes::new("temporal-grid", knobs.volumes, entries, grid))
         },
     },
     IndexKind {
@@ -402,7 +460,11 @@ pub const INDEXES: &[IndexKind] = &[
         summary: "of Sudarsky & Gotsman 1999: an octree over temporal bounding volumes",
         build: |entries| {
             let tree = |held: &[Entry]| octree(held, usual(Split::Octants, held));
-            Box::new(TemporalVolumes::new("temporal-octree", entries, tree))
+            Box::new(TemporalVolumes::new("temporal-octree", VolumeKnobs::default(), entries, tree))
+        },
+        with: |entries, knobs| {
+            let tree = |held: &[Entry]| octree(held, knobs.tree(Split::Octants));
+            Box::new(TemporalVolumes::new("temporal-octree", knobs.volumes, entries, tree))
         },
     },
 ];

@@ -249,6 +249,14 @@ impl Index for RegularGrid {
                 }
             }
         }
+        let slack = (0..).zip(&self.boxes).find(|&(number, whole): &(usize, &Aabb)| {
+            // Only a box that is marked may be larger than its objects need.
+            let all = self.cells[number].iter().map(|id| &boxes[id.0 as usize]);
+            !self.loose[number] && all.fold(Aabb::EMPTY, |all, one| all.union(one)) != *whole
+        });
+        if let Some((number, _)) = slack {
+            return Err(format!("the box of cell {number} is not that of its objects"));
+        }
         each_once(&seen)
     }
 }

@@ -5,8 +5,8 @@
 //! 1. A volume is the cube around the middle of the box that holds the object however it turns and
 //!    wherever it goes within its life.
 //! 2. Adaptive lives: a volume that expires without having been met by a view is followed by one of twice
-//!    the life, up to [`LONGEST`]; one that was met is followed in the next update by one of the
-//!    [`SHORTEST`]. The source uses the object itself where it is visible; a short life is the same but for
+//!    the life, up to the longest; one that was met is followed in the next update by one of the
+//!    shortest. The source uses the object itself where it is visible; a short life is the same but for
 //!    a little room, at a part of the updates.
 //! 3. Finding: of what the index within finds by volumes, those whose own boxes meet the view.
 //!
@@ -19,14 +19,9 @@ use std::borrow::Cow;
 use glam::DVec3;
 
 use super::checklist::{Checklists, Due};
-use super::{Entry, Index, MIDDLE_ROUNDING, Moves, Node, NodeId, Work, rounded_up};
+use super::{Entry, Index, MIDDLE_ROUNDING, Moves, Node, NodeId, VolumeKnobs, Work, rounded_up};
 use crate::math::{Aabb, Volume};
 use crate::part::ObjectId;
-
-/// Frames that the volume of an object in view lasts.
-const SHORTEST: u16 = 4;
-/// Frames that any volume lasts at most.
-const LONGEST: u16 = 256;
 
 /// What is known of an object.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +44,7 @@ fn rounding(far: f64, half: f64) -> f64 {
 /// An index over volumes.
 pub struct TemporalVolumes {
     name: &'static str,
+    knobs: VolumeKnobs,
     within: Box<dyn Index>,
     /// By object; empty for one with an empty box.
     volumes: Vec<Aabb>,
@@ -66,6 +62,7 @@ impl TemporalVolumes {
     #[must_use]
     pub fn new(
         name: &'static str,
+        knobs: VolumeKnobs,
         entries: &[Entry],
         build: impl FnOnce(&[Entry]) -> Box<dyn Index>,
     ) -> Self {
@@ -74,15 +71,17 @@ impl TemporalVolumes {
             step: rounded_up(entry.step_bound),
             due: Due::NEVER,
             // Not all in one frame.
-            life: SHORTEST + (number % usize::from(LONGEST / 8)) as u16,
+            life: (knobs.shortest + (number % usize::from((knobs.longest / 8).max(1))) as u16)
+                .min(knobs.longest),
             met: false,
         };
         let mut all = Self {
             name,
+            knobs,
             within: Box::new(super::List::new(&[])),
             volumes: vec![Aabb::EMPTY; entries.len()],
             fellows: entries.iter().enumerate().map(fellow).collect(),
-            lists: Checklists::new(u32::from(LONGEST) + 2),
+            lists: Checklists::new(u32::from(knobs.longest) + 2),
             renewed: Vec::new(),
             candidates: Vec::new(),
             object_checks: 0,
@@ -93,7 +92,7 @@ impl TemporalVolumes {
         let whole = all.volumes.iter().fold(Aabb::EMPTY, |whole, one| whole.union(one));
         let far = if whole.is_empty() { 0.0 } else { whole.max_abs().max_element() };
         let held = |(fellow, &bounds): (&Fellow, &Aabb)| {
-            let way = f64::from(fellow.step) * f64::from(LONGEST);
+            let way = f64::from(fellow.step) * f64::from(knobs.longest);
             let half = f64::from(fellow.reach) + way;
             // With the rounding of a volume that is anywhere within its index, half a space around included.
             Entry { bounds, step_bound: way, reach: half + rounding(2.0 * far, half) }
@@ -126,7 +125,7 @@ impl TemporalVolumes {
         for &id in &self.candidates {
             let fellow = &mut self.fellows[id.0 as usize];
             let first = !std::mem::replace(&mut fellow.met, true);
-            if first && fellow.life > SHORTEST && fellow.step > 0.0 {
+            if first && fellow.life > self.knobs.shortest && fellow.step > 0.0 {
                 self.lists.put_next(id, &mut fellow.due);
             }
         }
@@ -148,9 +147,10 @@ impl Index for TemporalVolumes {
         self.renewed.sort_unstable();
         self.renewed.dedup();
         let renewed = std::mem::take(&mut self.renewed);
+        let VolumeKnobs { shortest, longest } = self.knobs;
         for &id in &renewed {
             let fellow = &mut self.fellows[id.0 as usize];
-            fellow.life = if fellow.met { SHORTEST } else { (fellow.life * 2).min(LONGEST) };
+            fellow.life = if fellow.met { shortest } else { (fellow.life * 2).min(longest) };
             self.renew(id, moves.bounds(id));
         }
         self.within.update(Moves { boxes: &self.volumes, moved: &renewed, jumped: &renewed });
@@ -218,6 +218,18 @@ impl Index for TemporalVolumes {
         if let Some(object) = out {
             return Err(format!("object {object} has left its volume"));
         }
+        for (number, (own, volume)) in (0..).zip(boxes.iter().zip(&self.volumes)) {
+            let fellow = &self.fellows[number as usize];
+            if own.is_empty() {
+                continue;
+            }
+            // How much farther its middle may go without a corner of it reaching the volume's side.
+            let gone = (own.center() - volume.center()).abs().max_element();
+            let room = volume.size().min_element() * 0.5 - f64::from(fellow.reach) - gone;
+            let far = volume.max_abs().max_element();
+            let known = (room, f64::from(fellow.step), rounding(far, room.abs()));
+            self.lists.check((ObjectId(number), fellow.due), known)?;
+        }
         self.within.check(&self.volumes)
     }
 }
@@ -240,7 +252,9 @@ mod tests {
         let entry = |x: f64, step_bound| Entry { bounds: at(x), step_bound, reach: 0.1 + 1e-12 };
         let entries = [entry(0.5, 1e-5), entry(50.0, 1e-5), entry(0.2, 0.0)];
         let boxes = entries.map(|entry| entry.bounds);
-        let mut index = TemporalVolumes::new("test", &entries, |held| Box::new(List::new(held)));
+        let mut index = TemporalVolumes::new("test", VolumeKnobs::default(), &entries, |held| {
+            Box::new(List::new(held))
+        });
         let volume = Volume::new(&glam::DMat4::IDENTITY, DepthOrder::Forward);
         let mut renewals = [0; 3];
         for _ in 0..600 {

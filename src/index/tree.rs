@@ -19,7 +19,9 @@ use glam::DVec3;
 
 use super::checklist::{Checklists, Due};
 use super::tree_knobs::{Split, TreeKnobs};
-use super::{Entry, Index, Moves, Node, NodeId, Work, each_once, rounded_up, space_of_boxes};
+use super::{
+    Entry, Index, MIDDLE_ROUNDING, Moves, Node, NodeId, Work, each_once, rounded_up, space_of_boxes,
+};
 use crate::math::{Aabb, Planes, Volume};
 use crate::part::ObjectId;
 
@@ -101,8 +103,6 @@ struct Home {
     due: Due,
 }
 
-/// Updates ahead that can be foreseen.
-const AHEAD: u32 = 256;
 /// Objects that are due whose memory is read ahead of the decisions, so that the reads overlap.
 const READ_AHEAD: usize = 32;
 
@@ -155,7 +155,7 @@ impl<R: Rules> Tree<R> {
             knobs,
             nodes: Vec::new(),
             homes: entries.iter().map(Home::of).collect(),
-            lists: knobs.checklists.then(|| Checklists::new(AHEAD)),
+            lists: knobs.checklists.then(|| Checklists::new(knobs.ahead)),
             strays: Vec::new(),
             free: Vec::new(),
             rebuilt: Vec::new(),
@@ -593,6 +593,18 @@ impl<R: Rules> Tree<R> {
         Ok(())
     }
 
+    /// Whether the object is looked at before it can leave its node.
+    fn check_schedule(&self, id: ObjectId, boxes: &[Aabb]) -> Result<(), String> {
+        let (home, bounds) = (&self.homes[id.0 as usize], &boxes[id.0 as usize]);
+        let Some(lists) = self.lists.as_ref().filter(|_| !bounds.is_empty()) else {
+            return Ok(());
+        };
+        let space = &self.nodes[home.node as usize].space;
+        let far = bounds.max_abs().max(space.max_abs()).max_element();
+        let distance = inside(space, bounds);
+        lists.check((id, home.due), (distance, f64::from(home.step), far * MIDDLE_ROUNDING))
+    }
+
     fn check_node(&self, number: u32, boxes: &[Aabb], seen: &mut [u32]) -> Result<(), String> {
         let node = &self.nodes[number as usize];
         let mut below = 0;
@@ -627,7 +639,7 @@ impl<R: Rules> Tree<R> {
             let bounds = &boxes[id.0 as usize];
             let thing = self.thing(boxes, id);
             let stray = self.strays.binary_search(&id).is_ok();
-            if self.lists.is_none() && stray != self.is_stray(id, boxes) {
+            if stray != self.is_stray(id, boxes) {
                 return Err(format!("object {} is a stray: {stray}", id.0));
             }
             if bounds.is_empty() || stray {
@@ -740,6 +752,14 @@ impl<R: Rules + Send> Index for Tree<R> {
         }
         let mut seen = vec![0_u32; boxes.len()];
         order.iter().try_for_each(|node| self.check_node(node.0, boxes, &mut seen))?;
-        each_once(&seen)
+        each_once(&seen)?;
+        let strays = self.strays.iter();
+        if let Some(id) = strays.clone().find(|id| self.homes[id.0 as usize].node != 0) {
+            return Err(format!("object {} is a stray and not at the root", id.0));
+        }
+        if !strays.is_sorted_by(|a, b| a < b) {
+            return Err("the list of strays is not in order".to_owned());
+        }
+        (0..boxes.len() as u32).try_for_each(|id| self.check_schedule(ObjectId(id), boxes))
     }
 }

@@ -59,6 +59,9 @@ pub struct TreeKnobs {
     pub depth_reduction: u8,
     /// Whether objects are looked at only when they may have left their node.
     pub checklists: bool,
+    /// Updates ahead that checklists foresee, at least 3; who need not be looked at for longer is looked at
+    /// then.
+    pub ahead: u32,
     /// Whether a leaf with one object is looked at by the object's box.
     pub leaf_boxes: bool,
 }
@@ -66,6 +69,8 @@ pub struct TreeKnobs {
 impl TreeKnobs {
     /// The deepest level of all.
     pub const DEEPEST: u8 = 20;
+    /// Updates ahead that checklists foresee where nothing else is said.
+    pub const AHEAD: u32 = 256;
 
     /// For so many objects: about two to a node at the deepest level, were they spread evenly.
     #[must_use]
@@ -80,6 +85,7 @@ impl TreeKnobs {
             start_depth: 1,
             depth_reduction: 0,
             checklists: false,
+            ahead: Self::AHEAD,
             leaf_boxes: false,
         }
     }

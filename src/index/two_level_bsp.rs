@@ -4,13 +4,13 @@
 //!
 //! 1. Build: the space is the box of all objects; each node takes the plane that balances its objects
 //!    and cuts few (the paper leaves the choice open: candidates are the faces of the boxes), until a
-//!    node has [`LEAF_OBJECTS`] or none helps.
+//!    node has [`BspKnobs::leaf_objects`] or none helps.
 //! 2. Update: a moved object climbs until a subspace holds it, then sinks as far as one child holds it
 //!    whole. What left the space hangs at the root, whose box is then not asked about.
 //! 3. Lazy reconstruction (section 3.2: "after several frames the scene subdivision tree is locally
-//!    adjusted"): every [`RECONSTRUCTION_PERIOD`] updates the node that holds the most objects beyond
+//!    adjusted"): every [`BspKnobs::reconstruction_period`] updates the node that holds the most objects beyond
 //!    what it was built with is built anew, it and all below it.
-//! 4. Tight boxes (end of section 3.4): a node whose contents have stood still for [`TIGHTEN_AFTER`]
+//! 4. Tight boxes (end of section 3.4): a node whose contents have stood still for [`BspKnobs::tighten_after`]
 //!    updates offers the tight box of what hangs at and below it, and loses it at once on a change.
 //!
 //! Cost: build O(n log² n); update O(1) a moved object that stays in its node, else O(depth). It loses
@@ -21,22 +21,13 @@ use std::borrow::Cow;
 
 use glam::DVec3;
 
-use super::{Entry, Index, Moves, Node, NodeId, Work, find_by_nodes};
+use super::{BspKnobs, Entry, Index, Moves, Node, NodeId, Work, find_by_nodes};
 use crate::math::{Aabb, Volume};
 use crate::part::ObjectId;
 
-/// A node with no more objects than this is not parted any further.
-const LEAF_OBJECTS: usize = 2;
 /// A straddling object is looked at whenever its node is, so it weighs as much as this many objects
 /// out of balance when planes are compared.
 const STRADDLE_WEIGHT: usize = 3;
-
-/// Updates between two reconstructions. The paper says "several frames".
-const RECONSTRUCTION_PERIOD: u32 = 8;
-/// A node is worth building anew if it holds so many objects more than when it was built.
-const WORTH_RECONSTRUCTION: u32 = 2;
-/// Updates without a change after which a node's box is tightened. The paper says "several frames".
-const TIGHTEN_AFTER: u32 = 4;
 
 #[derive(Clone, Debug)]
 struct BspNode {
@@ -57,6 +48,7 @@ struct BspNode {
 /// The scene tree.
 #[derive(Clone, Debug)]
 pub struct TwoLevelBsp {
+    knobs: BspKnobs,
     nodes: Vec<BspNode>,
     bounds: Vec<Aabb>,
     node_of_object: Vec<NodeId>,
@@ -82,9 +74,16 @@ impl TwoLevelBsp {
     /// Builds the tree over the boxes of frame 0. Without objects it is one empty root.
     #[must_use]
     pub fn new(entries: &[Entry]) -> Self {
+        Self::with(entries, BspKnobs::default())
+    }
+
+    /// Builds the tree by other knobs.
+    #[must_use]
+    pub fn with(entries: &[Entry], knobs: BspKnobs) -> Self {
         let bounds: Vec<Aabb> = entries.iter().map(|e| e.bounds).collect();
         let space = bounds.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
         let mut tree = Self {
+            knobs,
             nodes: Vec::new(),
             node_of_object: vec![NodeId(0); bounds.len()],
             bounds,
@@ -139,7 +138,7 @@ impl TwoLevelBsp {
 
     /// Parts the leaf `node`, which is to hold `inside`.
     fn build(&mut self, node: NodeId, inside: &[u32]) {
-        if inside.len() <= LEAF_OBJECTS {
+        if inside.len() <= self.knobs.leaf_objects as usize {
             return;
         }
         let Some((axis, at)) = self.choose(inside) else { return };
@@ -191,7 +190,10 @@ impl TwoLevelBsp {
             (this.objects.len() as u32).saturating_sub(this.built_with)
         };
         let worst = self.order.iter().copied().max_by_key(|n| (gained(n), std::cmp::Reverse(*n)));
-        let Some(worst) = worst.filter(|node| gained(node) >= WORTH_RECONSTRUCTION) else { return };
+        let Some(worst) = worst.filter(|node| gained(node) >= self.knobs.worth_reconstruction)
+        else {
+            return;
+        };
         self.touch(worst);
         let mut objects = Vec::new();
         let mut stack = vec![worst];
@@ -242,12 +244,12 @@ impl TwoLevelBsp {
 
     /// Gives tight boxes to the nodes that have stood still long enough.
     fn tighten(&mut self) {
-        if self.updates > self.moved_in + TIGHTEN_AFTER {
+        if self.updates > self.moved_in + self.knobs.tighten_after {
             return;
         }
         for place in (0..self.order.len()).rev() {
             let this = &self.nodes[self.order[place].0 as usize];
-            if this.tight.is_some() || this.changed_in + TIGHTEN_AFTER > self.updates {
+            if this.tight.is_some() || this.changed_in + self.knobs.tighten_after > self.updates {
                 continue;
             }
             let own = this.objects.iter().map(|o| self.bounds[o.0 as usize]);
@@ -288,7 +290,7 @@ impl TwoLevelBsp {
     /// Whether a tight box is that of the contents, and only there while nothing moves.
     fn check_tight(&self, number: u32, node: &BspNode) -> Result<(), String> {
         let Some(tight) = node.tight else { return Ok(()) };
-        if node.changed_in + TIGHTEN_AFTER > self.updates {
+        if node.changed_in + self.knobs.tighten_after > self.updates {
             return Err(format!("node {number} is tight, but changed in {}", node.changed_in));
         }
         let boxes = node.objects.iter().map(|o| &self.bounds[o.0 as usize]);
@@ -393,7 +395,7 @@ impl Index for TwoLevelBsp {
                 self.bounds[object.0 as usize] = bounds;
             }
         }
-        if self.stale && self.updates.is_multiple_of(RECONSTRUCTION_PERIOD) {
+        if self.stale && self.updates.is_multiple_of(self.knobs.reconstruction_period) {
             self.stale = false;
             self.reconstruct();
         }

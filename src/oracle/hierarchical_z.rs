@@ -145,6 +145,33 @@ impl<R: PyramidRules> Pyramid<R> {
         Self { levels, rules: PhantomData }
     }
 
+    /// Whether each texel has the farthest depth of the samples that it stands for, and the top is one texel.
+    ///
+    /// # Errors
+    /// The first that has not.
+    fn check(&self) -> Result<(), String> {
+        let base = &self.levels[0];
+        for (k, level) in self.levels.iter().enumerate() {
+            let mut most = vec![f32::NEG_INFINITY; level.width * level.height];
+            for (y, row) in base.texels.chunks(base.width).enumerate() {
+                for (x, &depth) in row.iter().enumerate() {
+                    let Some(texel) = most.get_mut((y >> k) * level.width + (x >> k)) else {
+                        return Err(format!("level {k} has no texel for sample ({x}, {y})"));
+                    };
+                    *texel = farther(*texel, depth);
+                }
+            }
+            if let Some(texel) = most.iter().zip(&level.texels).position(|(most, has)| most != has)
+            {
+                return Err(format!(
+                    "texel {texel} of level {k} has not the farthest depth below it"
+                ));
+            }
+        }
+        let top = self.levels.last().map_or(0, |level| level.texels.len());
+        if top == 1 { Ok(()) } else { Err(format!("the top of the pyramid has {top} texels")) }
+    }
+
     /// Whether a rectangle, columns `min[0]..max[0]` and rows `min[1]..max[1]`, may show a sample at
     /// `depth` or beyond.
     fn may_show(&self, min: [u32; 2], max: [u32; 2], depth: f32) -> bool {
@@ -252,6 +279,13 @@ impl<R: PyramidRules> Oracle for HierarchicalZ<R> {
 
     fn read_back(&mut self) -> Result<Option<ReadBack>, OracleError> {
         self.sim.read_back()
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if self.age != Age::Older {
+            self.pyramid.check()?;
+        }
+        self.sim.check()
     }
 
     fn reference_image(&self) -> Option<&Image> {

@@ -64,6 +64,31 @@ impl DepthMaxima {
         }
     }
 
+    /// Whether every tile and block has the farthest depth of its samples, and there is one for each.
+    ///
+    /// # Errors
+    /// The first that has not, or how many there are.
+    pub(super) fn check(&self, image: DepthRows<'_>) -> Result<(), String> {
+        for (what, side, table) in
+            [("tile", SIDE, &self.tiles), ("block", SIDE * SIDE, &self.blocks)]
+        {
+            let across = image.width.div_ceil(side);
+            let mut most = vec![f32::NEG_INFINITY; across * image.height.div_ceil(side)];
+            for y in 0..image.height {
+                for (x, &depth) in image.row(y).iter().enumerate() {
+                    let place = &mut most[y / side * across + x / side];
+                    *place = farther(*place, depth);
+                }
+            }
+            if *table != most {
+                let place = most.iter().zip(table).position(|(most, has)| most != has);
+                let place = place.unwrap_or(most.len().min(table.len()));
+                return Err(format!("{what} {place} has not the farthest depth of its samples"));
+            }
+        }
+        Ok(())
+    }
+
     /// Whether any sample of columns `min[0]..max[0]`, rows `min[1]..max[1]` is at or beyond `depth`:
     /// what an occlusion query that compares less-or-equal says of a rectangle at that depth.
     pub(super) fn any(

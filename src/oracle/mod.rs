@@ -14,12 +14,12 @@ mod batches;
 mod cost;
 mod fit;
 pub mod hierarchical_z;
-#[cfg(feature = "hardware")]
 mod maxima;
 mod proxy_mesh;
 mod residency;
 mod sim;
 mod simulated;
+mod tables;
 mod tie;
 #[cfg_attr(not(feature = "hardware"), path = "no_wgpu.rs")]
 pub mod wgpu;
@@ -40,9 +40,11 @@ pub use fit::{FitError, Measurement};
 pub use hierarchical_z::HierarchicalZ;
 #[cfg(feature = "hardware")]
 use proxy_mesh::{box_proxy_triangles, hull_proxy_triangles, rectangle_triangles};
+use residency::Replayed;
 pub use residency::{Memory, MemoryKnobs, Residency, Step, least_budget, mesh_bytes};
 pub use sim::{Sim, part_draw, part_instance};
 pub use simulated::{Clock, Latency, Misbehaviour, Schedule, Simulated, WATCHDOG_NS};
+pub use tables::Tables;
 pub use tie::Tie;
 
 /// What an oracle is told at the start of a frame.
@@ -282,6 +284,15 @@ pub trait Oracle {
     /// [`Oracle::submit`]: then nobody need render the drawn parts once more to compare them.
     fn reference_image(&self) -> Option<&Image> {
         None
+    }
+
+    /// Whether every promise of its own books holds (tables over depths, meshes in memory), to be asked after
+    /// a frame; slow.
+    ///
+    /// # Errors
+    /// The first broken promise, in words.
+    fn check(&self) -> Result<(), String> {
+        Ok(())
     }
 
     /// Draws `parts` (ascending) from scratch in draw-index order under the frame's matrices, into

@@ -299,6 +299,76 @@ impl Residency {
     }
 }
 
+/// A device's memory as the steps leave it: what a real device would hold that carried them out. It notes
+/// the first step that no device could take, and the first draw of a mesh that it does not hold.
+#[derive(Clone, Debug)]
+pub(super) struct Replayed {
+    budget_bytes: u64,
+    /// By mesh: its bytes, and whether it is held.
+    meshes: Vec<(u64, bool)>,
+    bytes: u64,
+    broken: Option<String>,
+}
+
+impl Replayed {
+    pub(super) fn new(partition: &Partition, knobs: MemoryKnobs) -> Self {
+        let meshes = partition.meshes().iter().map(|mesh| (mesh_bytes(mesh), false)).collect();
+        Self { budget_bytes: knobs.budget_bytes, meshes, bytes: 0, broken: None }
+    }
+
+    /// Carries the steps out.
+    pub(super) fn follow(&mut self, steps: &[Step]) {
+        for &step in steps {
+            let (mesh, loads) = match step {
+                Step::Evict(mesh) => (mesh, false),
+                Step::Load(mesh) => (mesh, true),
+            };
+            let (bytes, held) = &mut self.meshes[mesh as usize];
+            let twice = std::mem::replace(held, loads) == loads;
+            self.bytes = match (twice, loads) {
+                (true, _) => self.bytes,
+                (false, true) => self.bytes + *bytes,
+                (false, false) => self.bytes - *bytes,
+            };
+            if twice {
+                self.note(|| format!("mesh {mesh} is loaded or thrown out twice"));
+            }
+            if self.bytes > self.budget_bytes {
+                self.note(|| format!("mesh {mesh} is loaded beyond the budget"));
+            }
+        }
+    }
+
+    /// Draws a mesh.
+    pub(super) fn draws(&mut self, mesh: u32) {
+        if !self.meshes[mesh as usize].1 {
+            self.note(|| format!("mesh {mesh} is drawn and not in memory"));
+        }
+    }
+
+    fn note(&mut self, what: impl FnOnce() -> String) {
+        self.broken.get_or_insert_with(what);
+    }
+
+    /// Whether all steps could be carried out, and the books say what is held.
+    pub(super) fn check(&self, books: &Residency) -> Result<(), String> {
+        if let Some(broken) = &self.broken {
+            return Err(broken.clone());
+        }
+        let most = books.counts().most_bytes;
+        if books.bytes() != self.bytes || most > self.budget_bytes || most < self.bytes {
+            let (said, most) = (books.bytes(), most);
+            let held = self.bytes;
+            return Err(format!("{held} bytes are held, {said} and at most {most} booked"));
+        }
+        let other = |(held, (_, there)): (&Held, &(u64, bool))| held.resident != *there;
+        match books.meshes.iter().zip(&self.meshes).position(other) {
+            Some(mesh) => Err(format!("the books are wrong about mesh {mesh}")),
+            None => Ok(()),
+        }
+    }
+}
+
 /// The least w of a box's corners, where the box may be inside the frustum. A guess: f32 without
 /// margins, since nothing but the time of a load depends on it.
 fn nearest_inside(clip: &[f32; 16], bounds: &Aabb) -> Option<f32> {

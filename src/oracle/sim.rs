@@ -7,7 +7,8 @@ use plainsight_reference::{Draw, Faces, Image, fast};
 use super::batches::Batches;
 use super::proxy_mesh::{box_triangles, hull_corners, hull_fan};
 use super::{
-    Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Residency, Stage,
+    Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, ReadBack, Replayed, Residency,
+    Stage, Step,
 };
 use crate::part::{PartId, Partition};
 
@@ -18,8 +19,9 @@ pub struct Sim {
     matrices: Vec<[f32; 16]>,
     waiting: Vec<PartId>,
     answers: Batches,
-    /// Where memory is limited: what a device would hold.
-    residency: Option<Residency>,
+    /// Where memory is limited: what a device would hold, and the steps that led there.
+    residency: Option<(Residency, Replayed)>,
+    steps: Vec<Step>,
 }
 
 /// What the naive renderer needs of one part.
@@ -66,7 +68,9 @@ impl Sim {
     #[must_use]
     pub fn new(stage: Stage) -> Self {
         let image = Image::ordered(stage.viewport, stage.depth);
-        let residency = stage.memory.map(|knobs| Residency::new(&stage.partition, knobs));
+        let residency = stage.memory.map(|knobs| {
+            (Residency::new(&stage.partition, knobs), Replayed::new(&stage.partition, knobs))
+        });
         Self {
             stage,
             image,
@@ -74,6 +78,7 @@ impl Sim {
             waiting: Vec::new(),
             answers: Batches::default(),
             residency,
+            steps: Vec::new(),
         }
     }
 
@@ -131,7 +136,7 @@ impl Oracle for Sim {
     }
 
     fn memory(&self) -> Option<Memory> {
-        self.residency.as_ref().map(Residency::counts)
+        self.residency.as_ref().map(|(residency, _)| residency.counts())
     }
 
     fn begin_frame(&mut self, view: &FrameView<'_>) -> Result<(), OracleError> {
@@ -140,16 +145,22 @@ impl Oracle for Sim {
         self.matrices.extend_from_slice(view.clip_from_object);
         self.waiting.clear();
         self.answers.clear();
-        if let Some(residency) = &mut self.residency {
-            residency.begin_frame(view, &mut Vec::new());
+        if let Some((residency, replayed)) = &mut self.residency {
+            self.steps.clear();
+            residency.begin_frame(view, &mut self.steps);
+            replayed.follow(&self.steps);
         }
         Ok(())
     }
 
     fn draw_part(&mut self, part: PartId) {
-        if let Some(residency) = &mut self.residency {
+        if let Some((residency, replayed)) = &mut self.residency {
             let (object, _) = self.stage.partition.locate(part);
-            residency.need(self.stage.partition.mesh_index(object), &mut Vec::new());
+            let mesh = self.stage.partition.mesh_index(object);
+            self.steps.clear();
+            residency.need(mesh, &mut self.steps);
+            replayed.follow(&self.steps);
+            replayed.draws(mesh);
         }
         self.waiting.push(part);
     }
@@ -175,6 +186,10 @@ impl Oracle for Sim {
     fn read_back(&mut self) -> Result<Option<ReadBack>, OracleError> {
         self.flush();
         Ok(Some(ReadBack { depth: self.image.depths(), parts: None }))
+    }
+
+    fn check(&self) -> Result<(), String> {
+        self.residency.as_ref().map_or(Ok(()), |(residency, replayed)| replayed.check(residency))
     }
 
     fn reference_image(&self) -> Option<&Image> {

@@ -304,6 +304,10 @@ impl Oracle for Simulated {
         self.sim.read_back()
     }
 
+    fn check(&self) -> Result<(), String> {
+        self.sim.check()
+    }
+
     fn reference_image(&self) -> Option<&Image> {
         self.sim.reference_image()
     }

@@ -8,6 +8,7 @@
 
 mod boxes;
 mod cache;
+mod check;
 mod cut;
 mod pack;
 mod tree;

@@ -6,13 +6,15 @@ use std::time::Instant;
 
 use plainsight_reference::Tolerance;
 
+use super::audit::{Deeds, audit, looks_closely};
 use super::heartbeat::Pulse;
 use super::stop::attempt;
 use super::{
     Canary, Cause, DeviceImages, FrameRecord, FrameState, FrameTrace, HASH_START, Moment,
     Repetition, Stop, Trace, Truth, World, canary, caught, fold,
 };
-use crate::cull::{Counts, Culler, Finished, Pen};
+use crate::cull::{Counts, Culler, Finished, Journal, Pen};
+use crate::index::promises;
 use crate::oracle::{FrameView, Oracle, OracleError, ReadBack};
 use crate::part::PartId;
 
@@ -50,6 +52,15 @@ pub trait Observer {
     /// One frame, in order from 0.
     fn frame(&mut self, record: &FrameRecord<'_>);
 
+    /// A promise that the lane's culler, index or oracle made was broken in that view of a frame; comes before
+    /// the frame itself, and only of lanes that are audited. One who does not judge may only pass it on.
+    ///
+    /// # Panics
+    /// With the promise, where that is not kept.
+    fn broken(&mut self, moment: Moment, promise: &str) {
+        panic!("{moment}: {promise}");
+    }
+
     /// A frame that was run for another time by a new culler: the traces must be equal.
     fn repeated(&mut self, repetition: &Repetition<'_>) {
         let _ = repetition;
@@ -79,6 +90,10 @@ pub struct Lane<'a> {
     /// done where its memory is limited: it would change what is resident. Lanes share one measurement a
     /// frame.
     pub with_bound: bool,
+    /// Whether every promise that the culler, its index and its oracle make on the way is held against each
+    /// frame, see [`Observer::broken`]. It is for oracles that err towards visible alone, without tolerance,
+    /// and takes time: not where that is measured.
+    pub audited: bool,
 }
 
 /// What is run again, with new cullers: the traces must be equal, and wall times are the medians.
@@ -124,6 +139,8 @@ struct Shot {
     trace: FrameTrace,
     drawn: Vec<PartId>,
     own: Option<ReadBack>,
+    /// What the culler did, where the lane is audited.
+    journal: Option<Journal>,
 }
 
 /// Runs every lane over frames `0..frames`, each view by itself, the lanes in turn within each view, then
@@ -238,6 +255,9 @@ impl Running<'_, '_> {
                     let beat = pulse.begin(place, Some(moment));
                     let shot = shoot(world, &state, facts, lane, culler, keeps_events)?;
                     drop(beat);
+                    if let Some(journal) = &shot.journal {
+                        hold(world, &state, &truth, lane, culler, (&shot.drawn, journal));
+                    }
                     observe(world, &state, &truth, lane, &shot, &mut shared.everything)?;
                     let bounded =
                         lane.info.device.is_some() && lane.with_bound && world.memory.is_none();
@@ -377,14 +397,13 @@ fn shoot(
     if keeps_events {
         pen = pen.keeping_events();
     }
+    let mut journal = lane.audited.then(Journal::default);
+    if let Some(journal) = &mut journal {
+        pen = pen.writing(journal);
+    }
     culler.frame(&state.view(world), &mut pen)?;
     let Finished { drawn, counts, events_hash, situations, events } = pen.finish()?;
     let wall_ns = start.elapsed().as_nanos() as u64;
-    if cfg!(debug_assertions)
-        && let Err(broken) = culler.check(&state.boxes)
-    {
-        panic!("{} broke its invariants in {}: {broken}", culler.name(), state.moment);
-    }
     let (memory, clock) = (oracle.memory(), oracle.clock());
     let words = |image: &ReadBack| {
         image.depth.iter().fold(HASH_START, |hash, depth| fold(hash, u64::from(depth.to_bits())))
@@ -415,7 +434,29 @@ fn shoot(
         wall_range_ns: [wall_ns; 2],
         visible_wall_ns: None,
     };
-    Ok(Shot { trace, drawn, own })
+    Ok(Shot { trace, drawn, own, journal })
+}
+
+/// Holds the promises of a lane against a frame of it, and tells its observer of the first that is broken.
+fn hold(
+    world: &World,
+    state: &FrameState,
+    truth: &Truth,
+    lane: &mut Lane<'_>,
+    culler: &dyn Culler,
+    (drawn, journal): (&[PartId], &Journal),
+) {
+    let kept = || {
+        culler.check(&state.boxes)?;
+        if let Some(scenery) = culler.scenery(state.moment.view) {
+            promises(scenery.index(), &state.boxes)?;
+            audit(world, state, truth, &Deeds { scenery, journal, drawn })?;
+        }
+        if looks_closely(state) { lane.oracle.check() } else { Ok(()) }
+    };
+    if let Err(promise) = kept() {
+        lane.observer.broken(state.moment, &promise);
+    }
 }
 
 fn observe(

@@ -3,6 +3,7 @@
 //! It must not know the checks: an observer is anything that implements [`Observer`].
 
 mod account;
+mod audit;
 mod boxes;
 mod calibrate;
 mod canary;

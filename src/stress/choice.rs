@@ -2,25 +2,69 @@
 
 use std::fmt;
 
-use crate::cull::{AfterGroup, CullerKind, FullKnobs, Postponement, ProxyKind};
-use crate::index::{INDEXES, IndexKind};
-use crate::oracle::{CostModel, Latency, Misbehaviour, Questions, Schedule};
-use crate::part::{Crossing, PartitionKnobs};
+use super::array::{Axis, level};
+use super::knobs::{Policy, index_knobs};
+use crate::cull::{Culler, CullerKind, CullerSetup, ProxyKind};
+use crate::index::{Entry, INDEXES, Index, IndexKind, IndexKnobs};
+use crate::oracle::{
+    CostModel, HierarchicalZ, Latency, MemoryKnobs, Misbehaviour, Oracle, OracleError, Questions,
+    Schedule, Sim, Simulated, Stage, Tables, least_budget,
+};
+use crate::part::{Crossing, Partition, PartitionKnobs};
 use crate::run::Canary;
 use crate::scene::generate::{Knobs, SWARM, build};
 use crate::scene::{DepthOrder, Scene, SceneError, Stream, Viewport};
 
-/// What answers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Device {
+/// What answers exactly or errs towards visible, without a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
     /// The reference, exact and at once.
     Sim,
     /// A pyramid of its depth.
     HierarchicalZ,
+    /// Tables of maxima of its depth.
+    Tables,
+}
+
+impl Source {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Sim => "sim",
+            Self::HierarchicalZ => "hierarchical-z",
+            Self::Tables => "tables",
+        }
+    }
+
+    /// An oracle of its own over the stage.
+    fn oracle(self, stage: Stage) -> Box<dyn Oracle> {
+        match self {
+            Self::Sim => Box::new(Sim::new(stage)),
+            Self::HierarchicalZ => Box::new(HierarchicalZ::new(stage)),
+            Self::Tables => Box::new(Tables::new(stage)),
+        }
+    }
+}
+
+/// What answers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Device {
+    /// At once.
+    Plain(Source),
     /// The simulated device under a schedule.
-    Simulated(Schedule),
+    Simulated(Source, Schedule),
     /// A real device.
     Real(Questions),
+}
+
+/// How much geometry the device may hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Room {
+    /// The largest mesh alone: the least budget there is.
+    Least,
+    /// Half as much again.
+    Tight,
+    /// Everything.
+    Ample,
 }
 
 /// Everything that a seed picks but the scene itself.
@@ -28,6 +72,8 @@ pub enum Device {
 pub struct Choice {
     /// The seed, also the scene's.
     pub seed: u64,
+    /// Times as many objects as the scene has by itself.
+    pub scale: f64,
     /// Pixels.
     pub viewport: Viewport,
     /// Which way depth runs.
@@ -38,14 +84,20 @@ pub struct Choice {
     pub partition: PartitionKnobs,
     /// The culler.
     pub culler: CullerKind,
-    /// Of `full`, another policy than its own.
-    pub policy: Option<FullKnobs>,
+    /// Other knobs of the culler than its own.
+    pub policy: Option<Policy>,
     /// The index under it.
     pub index: IndexKind,
+    /// Other knobs of the index than the usual ones.
+    pub index_knobs: Option<IndexKnobs>,
+    /// An index beside it, told of the same moves and held to its promises, with knobs of its own.
+    pub beside: IndexKind,
     /// What it asks about.
     pub proxy: ProxyKind,
     /// What work costs, for cullers that weigh it and for the virtual clock.
     pub cost: CostModel,
+    /// The device's memory, and bytes that may be loaded ahead of a frame; `None` without a limit.
+    pub memory: Option<(Room, u64)>,
     /// What answers.
     pub device: Device,
     /// What is wrong on purpose with the world: no seed picks any.
@@ -63,23 +115,80 @@ pub fn seed_of(text: &str) -> Result<u64, String> {
     seed.map_err(|_| format!("'{text}' is no seed: write a number or a commit's hash of 40 digits"))
 }
 
-/// Another policy of `full`; its own for one seed in three.
-fn policy(seed: u64) -> Option<FullKnobs> {
-    let mut policy = Stream::new(seed, "policy");
-    let knobs = FullKnobs {
-        most_in_flight: policy.pick(&[1024, 16, 1]),
-        postponement: policy.pick(&[
-            Postponement::Never,
-            Postponement::Figure3,
-            Postponement::Seldom,
-        ]),
-        most_together: policy.pick(&[1, 4, 16, 64]),
-        after_group: policy.pick(&[AfterGroup::AskAgain, AfterGroup::Trust]),
-        most_boxes: policy.pick(&[1, 4, 16]),
-        tighten: policy.below(2) == 0,
-        ..FullKnobs::default()
-    };
-    (policy.below(3) > 0).then_some(knobs)
+/// Most worlds are small; one in so many is large.
+pub const LARGE_ONE_IN: u64 = 50;
+/// Which of them is.
+const LARGE: u64 = 13;
+/// Times as many objects as a small world has.
+const LARGE_SCALE: f64 = 20.0;
+/// A world of small leaves has thousands of parts: it has the fewer objects.
+const SMALL_LEAVES_SCALE: f64 = 0.4;
+
+/// Axes of the array that worlds are drawn from; their order means nothing.
+mod axis {
+    use crate::stress::array::Axis;
+
+    pub(super) const PICTURE: Axis = Axis(0);
+    pub(super) const DEPTH: Axis = Axis(1);
+    pub(super) const FRAMES: Axis = Axis(2);
+    pub(super) const LEAF: Axis = Axis(3);
+    pub(super) const CROSSING: Axis = Axis(4);
+    pub(super) const CULLER: Axis = Axis(5);
+    pub(super) const PROXY: Axis = Axis(6);
+    pub(super) const INDEX: Axis = Axis(7);
+    pub(super) const COST: Axis = Axis(8);
+    pub(super) const DEVICE: Axis = Axis(9);
+    pub(super) const LATENCY: Axis = Axis(10);
+    pub(super) const DOUBT: Axis = Axis(11);
+    pub(super) const LIMITS: Axis = Axis(12);
+    pub(super) const KNOBS: Axis = Axis(13);
+    pub(super) const MEMORY: Axis = Axis(14);
+    pub(super) const MISBEHAVIOUR: Axis = Axis(15);
+    pub(super) const BESIDE: Axis = Axis(16);
+}
+
+/// Pictures: the usual one, and sizes at and beside the sides of tiles, blocks and levels.
+const PICTURES: [[u32; 2]; 16] = [
+    [160, 120],
+    [160, 120],
+    [160, 120],
+    [160, 120],
+    [97, 61],
+    [97, 61],
+    [97, 61],
+    [257, 33],
+    [31, 200],
+    [65, 63],
+    [64, 64],
+    [129, 72],
+    [72, 129],
+    [9, 7],
+    [1, 90],
+    [1, 1],
+];
+
+/// What work costs where questions are all but free: cullers that weigh them ask as much as they can.
+fn free_questions() -> CostModel {
+    CostModel {
+        name: "free-questions".to_owned(),
+        source: "made up, so that every question pays".to_owned(),
+        query_ns: 1.0,
+        proxy_ns: 0.0,
+        pixel_ns: 0.0,
+        trip_ns: 1.0,
+        ..CostModel::lavapipe()
+    }
+}
+
+/// Something that goes wrong in the first frames, of that kind.
+fn misbehaviour(kind: usize, seed: u64) -> Option<Misbehaviour> {
+    let mut wrong = Stream::new(seed, "misbehaviour");
+    match kind {
+        0 => Some(Misbehaviour::Lost(wrong.below(40))),
+        1 => Some(Misbehaviour::Hangs(wrong.below(40))),
+        2 => Some(Misbehaviour::Unwritten(wrong.below(200))),
+        _ => None,
+    }
 }
 
 impl Choice {
@@ -90,71 +199,92 @@ impl Choice {
     /// Without cullers.
     #[must_use]
     pub fn of(seed: u64, cullers: &[CullerKind], real: &[Questions]) -> Self {
-        // A stream a concern, so that one more culler does not move the picture.
-        let mut picture = Stream::new(seed, "picture");
-        let usual = SWARM.viewport;
-        let sizes = [
-            [usual.width, usual.height],
-            [usual.width, usual.height],
-            [usual.width, usual.height],
-            [97, 61],
-            [257, 33],
-            [31, 200],
-            [1, 1],
-        ];
-        let [width, height] = picture.pick(&sizes);
-        let depth = match picture.below(4) {
-            0 => DepthOrder::Reversed,
-            _ => DepthOrder::Forward,
-        };
-        let frames = picture.pick(&[SWARM.frames, SWARM.frames, SWARM.frames, 3, 24]);
-        let mut cut = Stream::new(seed, "cut");
-        // Small leaves make thousands of parts, and most of a sweep's time: one world in eight has them.
+        fn pick<T: Clone>(seed: u64, axis: Axis, list: &[T]) -> T {
+            list[level(seed, axis, list.len())].clone()
+        }
+        let large = seed % LARGE_ONE_IN == LARGE;
+        let [width, height] = pick(seed, axis::PICTURE, &PICTURES);
+        let depth = pick(
+            seed,
+            axis::DEPTH,
+            &[DepthOrder::Forward, DepthOrder::Forward, DepthOrder::Reversed],
+        );
+        let usual = SWARM.frames;
+        let frames = pick(seed, axis::FRAMES, &[usual, usual, usual, usual, usual, 3, 3, 24]);
         let usual = SWARM.leaf_triangles;
-        let partition = PartitionKnobs {
-            leaf_triangles: cut.pick(&[usual, usual, usual, usual, usual, 1000, 1000, 7]),
-            crossing: if cut.below(4) == 0 { Crossing::Whole } else { Crossing::Split },
-        };
-        let mut culler = Stream::new(seed, "culler");
-        let kind = culler.pick(cullers);
-        let proxy = culler.pick(&[ProxyKind::Rectangle, ProxyKind::Hull, ProxyKind::Box]);
-        let index = Stream::new(seed, "index").pick(INDEXES);
-        let policy = (kind.name == FullKnobs::default().name).then(|| policy(seed)).flatten();
-        let costs = CostModel::named();
-        let cost = costs[culler.below(costs.len() as u32) as usize].clone();
-        let mut device = Stream::new(seed, "device");
-        let latency = device.pick(&[Latency::Even, Latency::Jittery, Latency::Spiky]);
-        let doubt = device.pick(&[0.0, 0.0, 0.05, 0.5, 1.0]);
-        let mut wrong = Stream::new(seed, "misbehaviour");
-        // One device in ten goes wrong, somewhere in the first frames.
-        let misbehaviour = match wrong.below(30) {
-            0 => Some(Misbehaviour::Lost(wrong.below(40))),
-            1 => Some(Misbehaviour::Hangs(wrong.below(40))),
-            2 => Some(Misbehaviour::Unwritten(wrong.below(200))),
-            _ => None,
-        };
+        let leaves = [usual, usual, usual, usual, usual, usual, usual, 1000, 1000, 1000, 7];
+        let leaf_triangles = pick(seed, axis::LEAF, &leaves);
+        let crossing = pick(
+            seed,
+            axis::CROSSING,
+            &[Crossing::Split, Crossing::Split, Crossing::Split, Crossing::Whole, Crossing::Whole],
+        );
+        let mut partition = PartitionKnobs { leaf_triangles, crossing };
+        let mut culler = pick(seed, axis::CULLER, cullers);
+        let mut index = pick(seed, axis::INDEX, INDEXES);
+        let proxies = [ProxyKind::Rectangle, ProxyKind::Hull, ProxyKind::Box];
+        let proxy = pick(seed, axis::PROXY, &proxies);
+        let free = [free_questions(), free_questions()];
+        let costs = [CostModel::named().to_vec(), free.to_vec()].concat();
+        let cost = pick(seed, axis::COST, &costs);
+        let latency = pick(seed, axis::LATENCY, &[Latency::Even, Latency::Jittery, Latency::Spiky]);
+        let doubt = pick(seed, axis::DOUBT, &[0.0, 0.0, 0.0, 0.05, 0.05, 0.5, 1.0]);
+        // One device in ten goes wrong.
+        let misbehaviour = misbehaviour(level(seed, axis::MISBEHAVIOUR, 29), seed);
         let schedule = Schedule { seed, latency, doubt, misbehaviour };
-        let device = match device.below(8) {
-            _ if !real.is_empty() => Device::Real(device.pick(real)),
-            0 => Device::Sim,
-            1 => Device::HierarchicalZ,
-            _ => Device::Simulated(schedule),
+        let device = match level(seed, axis::DEVICE, 10) {
+            _ if !real.is_empty() => Device::Real(pick(seed, axis::DEVICE, real)),
+            0 => Device::Plain(Source::Sim),
+            1 | 2 => Device::Plain(Source::HierarchicalZ),
+            3 | 4 => Device::Plain(Source::Tables),
+            5 => Device::Simulated(Source::HierarchicalZ, schedule),
+            6 => Device::Simulated(Source::Tables, schedule),
+            _ => Device::Simulated(Source::Sim, schedule),
         };
-        let viewport = Viewport { width, height };
+        let rooms = [None, None, None, Some(Room::Least), Some(Room::Tight), Some(Room::Ample)];
+        let ahead = Stream::new(seed, "memory").pick(&[0, 1, 4096, MemoryKnobs::PREFETCH_BYTES]);
+        let memory = pick(seed, axis::MEMORY, &rooms).map(|room| (room, ahead));
+        let (mut frames, mut viewport) = (frames, Viewport { width, height });
+        let mut scale = if leaf_triangles < usual { SMALL_LEAVES_SCALE } else { 1.0 };
+        if large {
+            // Trees get deep, batches full and lists long; the time goes into objects alone. Members of the
+            // largest families come in turn.
+            let number = (seed / LARGE_ONE_IN) as usize;
+            (scale, frames, viewport) = (LARGE_SCALE, 3, Viewport { width: 97, height: 61 });
+            partition.leaf_triangles = 1000;
+            culler = cullers[number % cullers.len()];
+            index = INDEXES[(number + number / INDEXES.len()) % INDEXES.len()];
+        }
+        let policy = match level(seed, axis::LIMITS, 3) {
+            0 => None,
+            _ => Policy::of(seed, culler.name),
+        };
+        let index_knobs =
+            (level(seed, axis::KNOBS, 3) > 0).then(|| index_knobs(seed, "index knobs"));
         Self {
             seed,
+            scale,
             viewport,
             depth,
             frames,
             partition,
-            culler: kind,
+            culler,
             policy,
             index,
+            index_knobs,
+            beside: pick(seed, axis::BESIDE, INDEXES),
             proxy,
             cost,
+            memory,
             device,
             canary: None,
         }
+    }
+
+    /// Whether the world is one of the large ones.
+    #[must_use]
+    pub fn is_large(&self) -> bool {
+        self.seed % LARGE_ONE_IN == LARGE
     }
 
     /// The scene.
@@ -164,6 +294,7 @@ impl Choice {
     pub fn scene(&self) -> Result<Scene, SceneError> {
         let knobs = Knobs {
             seed: Some(self.seed),
+            scale: Some(self.scale),
             frames: Some(self.frames),
             viewport: Some(self.viewport),
             depth: Some(self.depth),
@@ -178,9 +309,56 @@ impl Choice {
     #[must_use]
     pub fn misbehaviour(&self) -> Option<Misbehaviour> {
         match self.device {
-            Device::Simulated(schedule) => schedule.misbehaviour,
+            Device::Simulated(_, schedule) => schedule.misbehaviour,
             _ => None,
         }
+    }
+
+    /// An oracle over the stage; `real` makes one of a real device, and is asked only for that.
+    ///
+    /// # Errors
+    /// What `real` says.
+    pub(super) fn oracle(
+        &self,
+        stage: Stage,
+        real: &super::MakeReal<'_>,
+    ) -> Result<Box<dyn Oracle>, OracleError> {
+        Ok(match self.device {
+            Device::Plain(source) => source.oracle(stage),
+            Device::Simulated(source, schedule) => {
+                let inner = source.oracle(stage.clone());
+                Box::new(Simulated::over(inner, stage, self.cost.clone(), schedule))
+            }
+            Device::Real(questions) => real(&stage, questions)?,
+        })
+    }
+
+    /// A culler over the index and partition of a setup.
+    pub(super) fn make(&self, setup: CullerSetup) -> Box<dyn Culler> {
+        match &self.policy {
+            Some(policy) => policy.make(setup),
+            None => (self.culler.make)(setup),
+        }
+    }
+
+    /// The index over the objects of frame 0.
+    pub(super) fn build(&self, entries: &[Entry]) -> Box<dyn Index> {
+        match &self.index_knobs {
+            Some(knobs) => (self.index.with)(entries, knobs),
+            None => (self.index.build)(entries),
+        }
+    }
+
+    /// The memory of a device that draws the parts of `partition`.
+    pub(super) fn memory_knobs(&self, partition: &Partition) -> Option<MemoryKnobs> {
+        let (room, prefetch_bytes) = self.memory?;
+        let least = least_budget(partition);
+        let budget_bytes = match room {
+            Room::Least => least,
+            Room::Tight => least + least / 2,
+            Room::Ample => u64::from(u32::MAX),
+        };
+        Some(MemoryKnobs { budget_bytes, prefetch_bytes })
     }
 
     /// The same with one thing as plain as it can be; `None` after the last of these steps.
@@ -188,14 +366,21 @@ impl Choice {
     pub fn simpler(&self, step: usize) -> Option<Self> {
         let sound = |Schedule { seed, .. }: Schedule| Schedule { seed, ..Schedule::default() };
         let device = match self.device {
-            Device::Simulated(schedule) => Device::Simulated(sound(schedule)),
+            Device::Simulated(source, schedule) => Device::Simulated(source, sound(schedule)),
+            other => other,
+        };
+        let at_once = match self.device {
+            Device::Simulated(source, _) => Device::Plain(source),
             other => other,
         };
         let split = PartitionKnobs { crossing: Crossing::Split, ..self.partition };
-        let list: [&dyn Fn(Self) -> Self; 7] = [
+        let list: [&dyn Fn(Self) -> Self; 10] = [
             &|choice| Self { policy: None, ..choice },
+            &|choice| Self { index_knobs: None, ..choice },
+            &|choice| Self { memory: None, ..choice },
             &|choice| Self { device, ..choice },
-            &|choice| Self { device: Device::Sim, ..choice },
+            &|choice| Self { device: at_once, ..choice },
+            &|choice| Self { device: Device::Plain(Source::Sim), ..choice },
             &|choice| Self { proxy: ProxyKind::Rectangle, ..choice },
             &|choice| Self { cost: CostModel::lavapipe(), ..choice },
             &|choice| Self { partition: split, ..choice },
@@ -204,14 +389,29 @@ impl Choice {
         list.get(step).map(|simpler| simpler(self.clone()))
     }
 
-    /// The flags of `run` that pick the same beside a scene file, each with a space before it.
+    /// What it has that no flag of `run` picks, each in a few words.
+    #[must_use]
+    pub fn beyond_flags(&self) -> Vec<&'static str> {
+        let simulated =
+            matches!(self.device, Device::Simulated(source, _) if source != Source::Sim);
+        let all = [
+            ("the limits of the culler", self.policy.is_some()),
+            ("the knobs of the index", self.index_knobs.is_some()),
+            ("memory by the byte", self.memory.is_some()),
+            ("the oracle under the simulated device", simulated),
+            ("the cost model", CostModel::named().iter().all(|m| m.name != self.cost.name)),
+        ];
+        all.into_iter().filter(|(_, there)| *there).map(|(what, _)| what).collect()
+    }
+
+    /// The flags of `run` that pick the same beside a scene file, but for [`Choice::beyond_flags`]; each with a
+    /// space before it.
     #[must_use]
     pub fn flags(&self) -> String {
         let mut flags = format!(" --culler {} --index {}", self.culler.name, self.index.name);
         match self.device {
-            Device::Sim => flags += " --oracle sim",
-            Device::HierarchicalZ => flags += " --oracle hierarchical-z",
-            Device::Simulated(Schedule { latency, doubt, misbehaviour, .. }) => {
+            Device::Plain(source) => flags += &format!(" --oracle {}", source.name()),
+            Device::Simulated(_, Schedule { latency, doubt, misbehaviour, .. }) => {
                 flags +=
                     &format!(" --oracle simulated --latency {} --doubt {doubt}", latency.name());
                 if let Some(misbehaviour) = misbehaviour {
@@ -260,30 +460,27 @@ impl fmt::Display for Choice {
             self.index.name,
             self.cost.name
         )?;
-        if let Some(knobs) = &self.policy {
-            write!(
-                f,
-                "[{} in flight, {:?} postponement, {} together then {:?}, {} boxes, {}] ",
-                knobs.most_in_flight,
-                knobs.postponement,
-                knobs.most_together,
-                knobs.after_group,
-                knobs.most_boxes,
-                if knobs.tighten { "tightened" } else { "not tightened" }
-            )?;
+        if let Some(policy) = &self.policy {
+            write!(f, "[{policy:?}] ")?;
+        }
+        if let Some(knobs) = &self.index_knobs {
+            write!(f, "[{knobs:?}] ")?;
         }
         match self.device {
-            Device::Sim => f.write_str("sim"),
-            Device::HierarchicalZ => f.write_str("hierarchical-z"),
-            Device::Simulated(Schedule { latency, doubt, misbehaviour, .. }) => {
-                let latency = latency.name();
-                write!(f, "simulated ({latency} latency, doubt {doubt}")?;
+            Device::Plain(source) => f.write_str(source.name()),
+            Device::Simulated(source, Schedule { latency, doubt, misbehaviour, .. }) => {
+                let (latency, source) = (latency.name(), source.name());
+                write!(f, "simulated (over {source}, {latency} latency, doubt {doubt}")?;
                 match misbehaviour {
                     Some(misbehaviour) => write!(f, ", {misbehaviour})"),
                     None => f.write_str(")"),
                 }
             }
             Device::Real(questions) => f.write_str(questions.name()),
+        }?;
+        match self.memory {
+            Some((room, ahead)) => write!(f, ", {room:?} memory, {ahead} bytes ahead"),
+            None => Ok(()),
         }
     }
 }
@@ -316,7 +513,10 @@ mod tests {
             let named = share(&|choice| choice.index.name == kind.name);
             assert!(named * INDEXES.len() > 1000, "{}", kind.name);
         }
-        assert!(share(&|choice| choice.device == Device::Sim) > 100);
+        let plain = |source| move |choice: &Choice| choice.device == Device::Plain(source);
+        for source in [Source::Sim, Source::HierarchicalZ, Source::Tables] {
+            assert!(share(&plain(source)) > 100);
+        }
         assert!(share(&|choice| choice.depth == DepthOrder::Reversed) > 300);
         assert!(share(&|choice| choice.partition.crossing == Crossing::Whole) > 300);
         let said = |seed| Choice::of(seed, CULLERS, &[]).to_string();

@@ -4,6 +4,7 @@
 use std::fmt;
 
 use crate::cull::{Situation, Situations};
+use crate::index::Shape;
 use crate::math::Aabb;
 use crate::run::{FrameRecord, Moment};
 
@@ -38,10 +39,27 @@ pub enum Probe {
     Hung,
     /// The answer to a question was never written, and was taken for "visible".
     Unwritten,
+    /// A draw had to wait for its mesh.
+    LoadedLate,
+    /// A mesh that was loaded ahead was drawn.
+    LoadedAhead,
+    /// A mesh was thrown out of memory.
+    ThrownOut,
+    /// An index beside the run has ten levels or more.
+    DeepIndex,
+    /// An index beside the run has ten objects or more at one node.
+    FullNode,
+    /// Things stuck out of the root's box of an index beside the run.
+    Strays,
+    /// The world is a large one.
+    Large,
 }
 
+/// From so many levels on an index is deep, and from so many objects on a node full.
+const MANY: u32 = 10;
+
 /// Those that are of no culler.
-const OTHERS: [Probe; 13] = [
+const OTHERS: [Probe; 20] = [
     Probe::Appeared,
     Probe::Vanished,
     Probe::NothingShows,
@@ -55,6 +73,13 @@ const OTHERS: [Probe; 13] = [
     Probe::Lost,
     Probe::Hung,
     Probe::Unwritten,
+    Probe::LoadedLate,
+    Probe::LoadedAhead,
+    Probe::ThrownOut,
+    Probe::DeepIndex,
+    Probe::FullNode,
+    Probe::Strays,
+    Probe::Large,
 ];
 
 impl Probe {
@@ -92,6 +117,13 @@ impl fmt::Display for Probe {
             Self::Lost => "the device went away",
             Self::Hung => "the device hung",
             Self::Unwritten => "an answer was never written",
+            Self::LoadedLate => "a draw waited for its mesh",
+            Self::LoadedAhead => "a mesh loaded ahead was drawn",
+            Self::ThrownOut => "a mesh was thrown out of memory",
+            Self::DeepIndex => "an index had ten levels or more",
+            Self::FullNode => "a node of an index had ten objects or more",
+            Self::Strays => "objects stuck out of an index's root",
+            Self::Large => "the world was large",
         })
     }
 }
@@ -139,6 +171,13 @@ pub(super) struct Watch {
 }
 
 impl Watch {
+    /// Notes how large and deep an index is.
+    pub(super) fn shape(&mut self, shape: Shape) {
+        self.reached.note(Probe::DeepIndex, shape.depth >= MANY);
+        self.reached.note(Probe::FullNode, shape.fullest >= MANY);
+        self.reached.note(Probe::Strays, shape.strays && shape.depth > 0);
+    }
+
     pub(super) fn frame(&mut self, record: &FrameRecord<'_>) {
         let (state, truth) = (record.state, record.truth);
         let Moment { frame, view } = state.moment;

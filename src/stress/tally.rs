@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::{Outcome, Probe};
+use super::member::may_meet;
+use super::{Outcome, Probe, RAREST_MEMBER_ONE_IN, RAREST_PAIR_ONE_IN};
 use crate::check::Ruling;
 
 /// Version of the lines.
@@ -33,6 +34,10 @@ pub struct Tally {
     pub most_queries: Option<Outcome>,
     /// Worlds that reached each probe, by its name.
     reached: BTreeMap<String, u64>,
+    /// Worlds that picked each member.
+    members: BTreeMap<String, u64>,
+    /// Worlds that picked both of two members, by the lower family's and then the other's.
+    pairs: BTreeMap<String, BTreeMap<String, u64>>,
 }
 
 impl Tally {
@@ -43,6 +48,15 @@ impl Tally {
         self.repeated += u64::from(outcome.repeated);
         for probe in &outcome.reached {
             *self.reached.entry(probe.clone()).or_default() += 1;
+        }
+        for (place, member) in outcome.members.iter().enumerate() {
+            *count(&mut self.members, member) += 1;
+            if !self.pairs.contains_key(member) {
+                self.pairs.insert(member.clone(), BTreeMap::new());
+            }
+            if let Some(others) = self.pairs.get_mut(member) {
+                outcome.members[place + 1..].iter().for_each(|other| *count(others, other) += 1);
+            }
         }
         let ruling = outcome.ruling();
         self.ruling = self.ruling.max(ruling);
@@ -69,12 +83,61 @@ impl Tally {
         Probe::all().map(|probe| (probe, count(&probe))).collect()
     }
 
+    /// Members with the number of worlds that picked each, the rarest first.
+    #[must_use]
+    pub fn members(&self) -> Vec<(u64, &str)> {
+        let mut members: Vec<_> =
+            self.members.iter().map(|(name, count)| (*count, name.as_str())).collect();
+        members.sort_unstable();
+        members
+    }
+
+    /// Pairs of members of two families with the number of worlds that picked both, the rarest first; pairs
+    /// that cannot be are left out.
+    #[must_use]
+    pub fn pairs(&self) -> Vec<(u64, [&str; 2])> {
+        let mut pairs = Vec::new();
+        let names: Vec<&str> = self.members.keys().map(String::as_str).collect();
+        let of = |a: &str, b: &str| {
+            self.pairs.get(a).and_then(|others| others.get(b)).copied().unwrap_or(0)
+        };
+        for (place, &one) in names.iter().enumerate() {
+            let others = names[place + 1..].iter().filter(|other| may_meet(one, other));
+            pairs.extend(others.map(|&other| (of(one, other) + of(other, one), [one, other])));
+        }
+        pairs.sort_unstable();
+        pairs
+    }
+
+    /// Members and pairs that came up less often than once in [`RAREST_MEMBER_ONE_IN`] and
+    /// [`RAREST_PAIR_ONE_IN`] worlds, a line each; of members that were picked at all.
+    #[must_use]
+    pub fn rare(&self) -> Vec<String> {
+        let members = self.members().into_iter();
+        let members = members
+            .filter(|(count, _)| *count < self.worlds / RAREST_MEMBER_ONE_IN)
+            .map(|(count, name)| format!("{count} worlds: {name}"));
+        let pairs = self.pairs().into_iter();
+        let pairs = pairs
+            .filter(|(count, _)| *count < self.worlds / RAREST_PAIR_ONE_IN)
+            .map(|(count, [a, b])| format!("{count} worlds: {a} with {b}"));
+        members.chain(pairs).collect()
+    }
+
     /// Probes that no world reached.
     #[must_use]
     pub fn never_reached(&self) -> Vec<Probe> {
         let never = |&(_, count): &(Probe, u64)| count == 0;
         self.probes().into_iter().filter(never).map(|(probe, _)| probe).collect()
     }
+}
+
+/// The count under a name, without a copy of a name that is there.
+fn count<'a>(counts: &'a mut BTreeMap<String, u64>, name: &str) -> &'a mut u64 {
+    if !counts.contains_key(name) {
+        counts.insert(name.to_owned(), 0);
+    }
+    counts.get_mut(name).expect("it was put in if it was not there")
 }
 
 /// Keeps the outcome with the larger figure, and the lower seed of two alike.
@@ -94,6 +157,7 @@ mod tests {
             seed,
             options: String::new(),
             scene: String::new(),
+            members: vec!["culler full".to_owned(), format!("index {}", seed % 2)],
             shots: 10,
             failed_in: None,
             failures: failures.iter().map(|line| (*line).to_owned()).collect(),

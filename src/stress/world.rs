@@ -2,13 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::beside::{Beside, go_on_alone};
 use super::probe::{Probe, Watch};
-use super::{Choice, Device, Reached};
+use super::{Choice, Reached};
 use crate::check::{Check, Gate, Ruling, TruthCheck};
-use crate::cull::{CullerSetup, Full, PerView};
-use crate::oracle::{
-    HierarchicalZ, Misbehaviour, Oracle, OracleError, Questions, Sim, Simulated, Stage,
-};
+use crate::cull::{CullerSetup, PerView};
+use crate::oracle::{Memory, Misbehaviour, Oracle, OracleError, Questions, Stage};
 use crate::part::PartId;
 use crate::run::{
     Canary, Cause, FrameRecord, Lane, LaneInfo, Moment, Observer, Repeat, Repetition, RunError,
@@ -32,6 +31,8 @@ pub struct Outcome {
     pub options: String,
     /// What is in the scene.
     pub scene: String,
+    /// What it picked of each family, by name.
+    pub members: Vec<String>,
     /// Frames times views.
     pub shots: u32,
     /// What failed, a line each; empty where all held.
@@ -61,10 +62,10 @@ pub struct Outcome {
 }
 
 /// The gate, and who watches for probes.
-#[derive(Default)]
 struct Watched {
     gate: Gate,
     watch: Watch,
+    beside: Beside,
     /// What was drawn when something failed first.
     wrong: Option<(Moment, Vec<PartId>)>,
     /// Frames and views seen.
@@ -79,9 +80,18 @@ impl Observer for Watched {
         self.shots += 1;
         self.gate.frame(record);
         self.watch.frame(record);
+        let moment = record.state.moment;
+        if let Err(promise) = self.beside.frame(record) {
+            self.gate.broken(moment, &promise);
+        }
+        self.watch.shape(self.beside.shape);
         if self.wrong.is_none() && self.gate.first_failure().is_some() {
             self.wrong = Some((record.state.moment, record.drawn.to_vec()));
         }
+    }
+
+    fn broken(&mut self, moment: Moment, promise: &str) {
+        self.gate.broken(moment, promise);
     }
 
     fn repeated(&mut self, repetition: &Repetition<'_>) {
@@ -130,41 +140,53 @@ pub struct Judged {
 pub fn judged_in(choice: &Choice, scene: Scene, real: &MakeReal<'_>) -> Result<Judged, RunError> {
     let (said, frames) = (summary(&scene), scene.frames);
     let world = World::new(scene, choice.partition).with_canary(choice.canary);
-    let stage = world.stage();
-    let oracle: Box<dyn Oracle> = match choice.device {
-        Device::Sim => Box::new(Sim::new(stage)),
-        Device::HierarchicalZ => Box::new(HierarchicalZ::new(stage)),
-        Device::Simulated(schedule) => {
-            Box::new(Simulated::new(stage, choice.cost.clone(), schedule))
-        }
-        Device::Real(questions) => real(&stage, questions)?,
+    let cut = world.partition.check();
+    let world = match choice.memory_knobs(&world.partition) {
+        Some(memory) => world.within(memory)?,
+        None => world,
     };
+    let oracle = choice.oracle(world.stage(), real)?;
     let entries = world.entries();
     let make = || {
         let setup = CullerSetup {
             partition: world.partition.clone(),
-            index: (choice.index.build)(&entries),
+            index: choice.build(&entries),
             proxy: choice.proxy,
             cost: choice.cost.clone(),
         };
-        match &choice.policy {
-            Some(knobs) => Box::new(Full::new(setup, knobs.clone())),
-            None => (choice.culler.make)(setup),
-        }
+        choice.make(setup)
     };
     // What goes wrong goes wrong once, and not again in a repetition.
     let wrong = choice.misbehaviour();
     let to_be_lost = wrong.is_some_and(Misbehaviour::is_fatal);
     let truth = TruthCheck::sampling(Stream::new(choice.seed, "naive"), NAIVE_ONE_IN);
-    let gate = Gate::default().sampling(truth);
-    let mut watched = Watched { gate, to_be_lost, ..Watched::default() };
+    let mut watched = Watched {
+        gate: Gate::default().sampling(truth),
+        watch: Watch::default(),
+        beside: Beside::new(choice, &world, entries.clone()),
+        wrong: None,
+        shots: 0,
+        to_be_lost,
+        lost: false,
+    };
+    if let Err(promise) = cut {
+        watched.gate.broken(Moment { frame: 0, view: 0 }, &promise);
+    }
     let info = LaneInfo::of(choice.culler.name, oracle.as_ref(), String::new());
     let culler = Box::new(|| PerView::over(world.views(), make));
-    let lane = Lane { info, culler, oracle, observer: &mut watched, with_bound: false };
+    // What a real device's tolerance makes of an answer the audit does not know.
+    let audited = oracle.device().is_none();
+    let observer = &mut watched;
+    let lane = Lane { info, culler, oracle, observer, with_bound: false, audited };
     let wanted = choice.canary.is_some_and(Canary::wants_repetition);
     let repeated = wanted || choice.seed.is_multiple_of(REPEATED_ONE_IN) && wrong.is_none();
     let repeat = if repeated { Repeat::first(frames) } else { Repeat::NONE };
     let traces = run(&world, frames, repeat, &mut [lane], &mut || true)?;
+    if choice.is_large()
+        && let Err((frame, promise)) = go_on_alone(choice, &world)
+    {
+        watched.gate.broken(Moment { frame, view: 0 }, &promise);
+    }
     let outcome = match wrong.filter(|_| watched.lost) {
         Some(wrong) => ended(choice, said, wrong, &mut watched),
         None => outcome(choice, said, &traces[0], &mut watched, repeated),
@@ -182,6 +204,7 @@ fn ended(choice: &Choice, scene: String, wrong: Misbehaviour, watched: &mut Watc
         seed: choice.seed,
         options: choice.to_string(),
         scene,
+        members: names(choice),
         shots: *shots,
         failures: gate.failures(),
         verdict: gate.word(),
@@ -205,6 +228,7 @@ impl Outcome {
             seed: choice.seed,
             options: choice.to_string(),
             scene: choice.scene().map_or_else(|error| error.to_string(), |scene| summary(&scene)),
+            members: names(choice),
             shots: 0,
             failures: vec![format!("{}: {said}", check.name())],
             verdict: check.ruling().word().to_owned(),
@@ -238,7 +262,13 @@ fn outcome(
     repeated: bool,
 ) -> Outcome {
     let reached: &mut Reached = &mut watch.reached;
+    reached.note(Probe::Large, choice.is_large());
     trace.frames.iter().for_each(|frame| reached.note_situations(frame.situations));
+    let memory = || trace.frames.iter().filter_map(|frame| frame.memory);
+    let some = |figure: fn(&Memory) -> u64| memory().any(|memory| figure(&memory) > 0);
+    reached.note(Probe::LoadedLate, some(|memory| memory.late_loads));
+    reached.note(Probe::LoadedAhead, some(|memory| memory.prefetches_used));
+    reached.note(Probe::ThrownOut, some(|memory| memory.evictions));
     let clock = trace.frames.iter().filter_map(|frame| frame.clock).next_back();
     if let Some(clock) = clock {
         reached.note(Probe::FalseVisible, clock.false_visible > 0);
@@ -250,6 +280,7 @@ fn outcome(
         seed: choice.seed,
         options: choice.to_string(),
         scene,
+        members: names(choice),
         shots: trace.frames.len() as u32,
         failures: gate.failures(),
         verdict: gate.word(),
@@ -263,6 +294,11 @@ fn outcome(
         hash: format!("{:016x}", trace.hash()),
         replay: String::new(),
     }
+}
+
+/// What a world picked of each family, the family's name before the member's.
+fn names(choice: &Choice) -> Vec<String> {
+    choice.members().into_iter().map(|(family, member)| format!("{family} {member}")).collect()
 }
 
 /// What is in a scene, in a line.

@@ -4,8 +4,8 @@
 
 use crate::index::{
     Entry, GridKnobs, Index, IrregularOctree, LazyGrid, List, LooseKnobs, RegularGrid, Split,
-    TemporalVolumes, TreeKnobs, TwoLevelBsp, bounds_octree, extents_octree, loose_octree, octree,
-    overlapping_octree, radius_octree,
+    TemporalVolumes, TreeKnobs, TwoLevelBsp, VolumeKnobs, bounds_octree, extents_octree,
+    loose_octree, octree, overlapping_octree, radius_octree,
 };
 
 /// A tree of the thesis, or something beside it.
@@ -69,10 +69,20 @@ impl Contender {
             Method::Four => loose_octree(entries, knobs, self.loose),
             Method::Irregular => Box::new(IrregularOctree::new(entries, knobs)),
             Method::RegularGrid => grid(entries),
-            Method::TemporalGrid => Box::new(TemporalVolumes::new("temporal-grid", entries, grid)),
+            Method::TemporalGrid => Box::new(TemporalVolumes::new(
+                "temporal-grid",
+                VolumeKnobs::default(),
+                entries,
+                grid,
+            )),
             Method::TemporalOctree => {
                 let tree = |held: &[Entry]| octree(held, knobs);
-                Box::new(TemporalVolumes::new("temporal-octree", entries, tree))
+                Box::new(TemporalVolumes::new(
+                    "temporal-octree",
+                    VolumeKnobs::default(),
+                    entries,
+                    tree,
+                ))
             }
             Method::Bsp => Box::new(TwoLevelBsp::new(entries)),
             Method::LazyGrid => Box::new(LazyGrid::new(entries, GridKnobs::default())),

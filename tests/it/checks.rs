@@ -155,7 +155,7 @@ fn before(mut gate: Gate, flaws: Flaws, leaves_out: fn(&[PartId]) -> Vec<PartId>
     let oracle = Box::new(Fake { sim, world: self::world(), matrices, flaws });
     let info = LaneInfo::of("draws", oracle.as_ref(), String::new());
     let culler = Box::new(|| Box::new(Draws::but(leaves_out)) as Box<dyn Culler>);
-    let lane = Lane { info, culler, oracle, observer: &mut gate, with_bound: false };
+    let lane = Lane { info, culler, oracle, observer: &mut gate, with_bound: false, audited: true };
     run(&world, FRAMES, Repeat::NONE, &mut [lane], &mut || true).unwrap();
     gate
 }

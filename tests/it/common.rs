@@ -128,7 +128,8 @@ pub(crate) fn gates(
         let replay = format!("scene {} seed {}", world.scene.name, world.scene.seed);
         let info = LaneInfo::of(culler.name, oracle.as_ref(), replay);
         let (culler, observer) = (Box::new(make), gate);
-        lanes.push(Lane { info, culler, oracle, observer, with_bound: false });
+        let audited = device.is_none();
+        lanes.push(Lane { info, culler, oracle, observer, with_bound: false, audited });
     }
     let frames = world.scene.frames;
     let traces = run(world, frames, Repeat::first(1), &mut lanes, &mut || true).unwrap();

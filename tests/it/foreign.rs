@@ -122,7 +122,7 @@ fn drawn_by_vfc(world: &World) -> Vec<String> {
     let oracle = oracle("always", world);
     let info = LaneInfo::of("vfc", oracle.as_ref(), String::new());
     let (culler, observer) = (Box::new(make), &mut scribe);
-    let lane = Lane { info, culler, oracle, observer, with_bound: false };
+    let lane = Lane { info, culler, oracle, observer, with_bound: false, audited: false };
     run_lanes(world, FRAMES, Repeat::NONE, &mut [lane], &mut || true).unwrap();
     scribe.0
 }

@@ -189,7 +189,8 @@ fn only_what_need_not_show_is_forgiven() {
         let oracle = oracle(oracle_name, &world);
         let info = LaneInfo::of("without", oracle.as_ref(), String::new());
         let culler = Box::new(move || Box::new(Without(part)) as Box<dyn Culler>);
-        let lane = Lane { info, culler, oracle, observer: &mut gate, with_bound: false };
+        let lane =
+            Lane { info, culler, oracle, observer: &mut gate, with_bound: false, audited: false };
         run(&world, 1, Repeat::NONE, &mut [lane], &mut || true).unwrap();
         let (misses, forgiven) = (gate.conservative.misses().len(), gate.conservative.may_missed());
         (misses, forgiven, gate.image.differences().len())
