@@ -571,6 +571,7 @@ impl Culler for Adaptive {
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
         self.scenery.begin_frame(view, &mut self.history);
+        self.scenery.note_update(pen);
         for odds in [&mut self.shows, &mut self.was_hidden, &mut self.new] {
             odds.forget();
         }

@@ -50,6 +50,7 @@ impl Culler for Chc {
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
         self.scenery.begin_frame(view, &mut self.visible_after);
+        self.scenery.note_update(pen);
         self.opened.clear();
         let mut stack = vec![(Item::Scene(NodeId(0)), NO_PARENT)];
         let (mut asked, mut answers): (Vec<Asked>, _) = (Vec::new(), Vec::new());

@@ -198,6 +198,7 @@ impl Culler for ChcPlus {
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
         self.scenery.begin_frame(view, &mut self.history);
+        self.scenery.note_update(pen);
         self.opened.clear();
         self.queued.clear();
         self.asked.clear();

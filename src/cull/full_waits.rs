@@ -204,6 +204,7 @@ impl Culler for FullWaits {
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
         self.scenery.begin_frame(view, &mut self.history);
+        self.scenery.note_update(pen);
         let mut active = vec![(Item::Scene(NodeId(0)), State::New)];
         let mut answers = Vec::new();
         while !active.is_empty() {

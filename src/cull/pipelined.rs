@@ -60,6 +60,7 @@ impl Culler for Pipelined {
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
         self.scenery.begin_frame::<()>(view, &mut Vec::new());
+        self.scenery.note_update(pen);
         let mut stack = vec![Item::Scene(NodeId(0))];
         let (mut next, mut answers) = (Vec::new(), Vec::new());
         let (mut open, mut sent) = (Vec::new(), VecDeque::new());

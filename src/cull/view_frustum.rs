@@ -26,6 +26,7 @@ impl Culler for ViewFrustum {
 
     fn frame(&mut self, view: &View<'_>, pen: &mut Pen<'_>) -> Result<(), OracleError> {
         self.scenery.begin_frame::<()>(view, &mut Vec::new());
+        self.scenery.note_update(pen);
         let mut stack = vec![Item::Scene(NodeId(0))];
         let mut next = Vec::new();
         while let Some(item) = stack.pop() {

@@ -351,6 +351,10 @@ impl LazyGrid {
             let room = self.room(home.cell, at);
             if room * 2.0 >= slack {
                 self.work.ok += 1;
+                if home.cell == 0 {
+                    // Back from beyond it, perhaps.
+                    self.note_stray(id, room);
+                }
                 self.schedule(id, room);
             } else {
                 self.move_on(id, at);

@@ -28,6 +28,19 @@ pub struct Shape {
     pub strays: bool,
 }
 
+impl Shape {
+    /// The larger of each figure.
+    #[must_use]
+    pub fn larger(self, other: Self) -> Self {
+        Self {
+            nodes: self.nodes.max(other.nodes),
+            depth: self.depth.max(other.depth),
+            fullest: self.fullest.max(other.fullest),
+            strays: self.strays || other.strays,
+        }
+    }
+}
+
 /// Whether every promise of any index holds, with the objects in these boxes.
 ///
 /// # Errors

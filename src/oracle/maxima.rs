@@ -135,16 +135,31 @@ mod tests {
 
     use super::*;
 
+    /// Sides of an image, those at and beside the sides of tiles, blocks and levels as often as all others.
+    fn sides() -> impl Strategy<Value = usize> {
+        prop_oneof![1_usize..150, proptest::sample::select(&[1, 7, 8, 9, 63, 64, 65, 128, 129][..])]
+    }
+
+    /// Places along a side, the first and the last as often as all others.
+    fn places() -> impl Strategy<Value = usize> {
+        prop_oneof![0_usize..150, Just(0), Just(usize::MAX)]
+    }
+
+    /// Shares of a side, its ends as often as all others.
+    fn share() -> impl Strategy<Value = f64> {
+        prop_oneof![0.0..1.0_f64, Just(0.0), Just(1.0)]
+    }
+
     proptest! {
         /// Equal to looking at every sample, whatever the size, the padding and the rectangle.
         #[test]
         fn equals_looking_at_every_sample(
-            width in 1_usize..150,
-            height in 1_usize..150,
+            width in sides(),
+            height in sides(),
             padding in 0_usize..3,
-            far in proptest::collection::vec((0_usize..150, 0_usize..150, 0_u8..4), 0..6),
-            corners in [0.0..1.0_f64, 0.0..1.0, 0.0..1.0, 0.0..1.0],
-            depth in 0_u8..5,
+            far in proptest::collection::vec((places(), places(), 0_u8..4), 0..6),
+            corners in [share(), share(), share(), share()],
+            depth in 0_u8..=4,
             reversed in proptest::bool::ANY,
         ) {
             let stride = width + padding;
@@ -156,11 +171,11 @@ mod tests {
                 samples[y * stride..y * stride + width].fill(least);
             }
             for (x, y, d) in far {
-                samples[y % height * stride + x % width] = f32::from(d) / 4.0 + least;
+                samples[y.min(height - 1) * stride + x.min(width - 1)] = f32::from(d) / 4.0 + least;
             }
             let image = DepthRows { samples: &samples, stride, width, height };
             let span = |a: f64, b: f64, side: usize| {
-                let low = (a.min(b) * side as f64) as u32;
+                let low = ((a.min(b) * side as f64) as u32).min(side as u32 - 1);
                 (low, ((a.max(b) * side as f64) as u32).max(low + 1))
             };
             let ((x0, x1), (y0, y1)) =

@@ -21,7 +21,7 @@ use crate::oracle::Proxy;
 use crate::part::{ObjectId, PartId};
 
 /// One frame in so many is held to its bounds.
-const BOUNDS_ONE_IN: u32 = 4;
+const BOUNDS_ONE_IN: u32 = 2;
 /// Boxes by which parts are asked about in turn, from bound to bound.
 const BOXES: [usize; 3] = [1, 4, 16];
 
@@ -102,6 +102,20 @@ fn merged(into: &mut Option<Seen>, other: &Seen) {
     }
 }
 
+/// Whether a triangle of the fan from the first corner holds a place: what of a hull is drawn. Its corners are
+/// rounded, so that it need not be convex to the last sub-pixel.
+fn fan_holds(corners: &[[i32; 2]], at: [i32; 2]) -> bool {
+    let side = |from: [i32; 2], to: [i32; 2]| {
+        let wide = |i: usize, end: [i32; 2]| i64::from(end[i]) - i64::from(from[i]);
+        wide(0, to) * wide(1, at) - wide(0, at) * wide(1, to)
+    };
+    corners.windows(2).skip(1).any(|pair| {
+        let round = [(corners[0], pair[0]), (pair[0], pair[1]), (pair[1], corners[0])];
+        let sides = round.map(|(from, to)| side(from, to));
+        sides.iter().all(|side| *side >= 0) || sides.iter().all(|side| *side <= 0)
+    })
+}
+
 /// Whether a proxy is at that sample and no farther.
 fn covers(proxy: &Proxy, (x, y, stored): (u32, u32, f32)) -> bool {
     match proxy {
@@ -110,7 +124,7 @@ fn covers(proxy: &Proxy, (x, y, stored): (u32, u32, f32)) -> bool {
         }
         Proxy::Hull { hull, depth, .. } => {
             let middle = [x, y].map(|at| at as i32 * HULL_SUBPIXELS + HULL_SUBPIXELS / 2);
-            hull.holds(middle) && *depth <= stored
+            fan_holds(hull.corners(), middle) && *depth <= stored
         }
         // What it covers is known to renderers alone.
         Proxy::Box { .. } => true,
@@ -353,24 +367,29 @@ impl<'a> Audit<'a> {
             Appearance::Ask { rectangle, depth, proxy } => (rectangle, depth, proxy),
         };
         let PixelRectangle { min, max } = rectangle;
-        self.cover(item, &[Proxy::Rectangle { min, max, depth }], seen)?;
-        self.cover(item, &[proxy], seen)?;
+        self.cover((item, "rectangle"), &[Proxy::Rectangle { min, max, depth }], seen)?;
+        self.cover((item, "proxy"), &[proxy], seen)?;
         let mut proxies = Vec::new();
         let most = BOXES[(self.view.frame / BOUNDS_ONE_IN) as usize % BOXES.len()];
         scenery.tightest_proxies(&self.view, item, (proxy, most), &mut proxies);
-        self.cover(item, &proxies, seen)
+        self.cover((item, "tighter proxies"), &proxies, seen)
     }
 
-    fn cover(&self, item: Item, proxies: &[Proxy], seen: &Seen) -> Result<(), String> {
+    fn cover(
+        &self,
+        (item, what): (Item, &str),
+        proxies: &[Proxy],
+        seen: &Seen,
+    ) -> Result<(), String> {
         let missed = seen.samples().find(|&sample| !proxies.iter().any(|p| covers(p, sample)));
         if let Some((x, y, depth)) = missed {
             return Err(format!(
-                "{item:?} shows at ({x}, {y}), depth {depth}, where nothing would be asked about"
+                "{item:?} shows at ({x}, {y}), depth {depth}, and its {what} is not there"
             ));
         }
         let boxes = proxies.iter().all(|proxy| matches!(proxy, Proxy::Box { .. }));
         if boxes && !proxies.iter().any(|proxy| proxy.shows(&self.truth.image)) {
-            return Err(format!("{item:?} shows, and its boxes do not"));
+            return Err(format!("{item:?} shows, and its {what} does not"));
         }
         Ok(())
     }

@@ -12,6 +12,10 @@ use crate::math::{Aabb, Volume};
 use crate::part::ObjectId;
 use crate::run::{Boxes, FrameRecord, World};
 
+/// Indexes beside a world, of which it picks the first.
+const BESIDE: usize = 3;
+/// How far apart they are in the register, so that they are of other kinds.
+const APART: usize = 7;
 /// Frames that boxes alone go on beside a large world, which is drawn for a few only.
 const LARGE_FRAMES: u32 = 24;
 /// Indexes of these.
@@ -69,21 +73,26 @@ impl Member {
 
 /// The indexes beside one world.
 pub(super) struct Beside {
-    member: Member,
+    members: Vec<Member>,
     entries: Vec<Entry>,
     boxes: Boxes,
     /// Middles in the frame before.
     middles: Vec<DVec3>,
-    /// The latest shape.
+    /// The largest so far.
     pub(super) shape: Shape,
 }
 
 impl Beside {
     pub(super) fn new(choice: &Choice, world: &World, entries: Vec<Entry>) -> Self {
-        let knobs = index_knobs(choice.seed, "index knobs beside");
-        let member = Member::new(choice.beside.name, (choice.beside.with)(&entries, &knobs));
+        let first = INDEXES.iter().position(|kind| kind.name == choice.beside.name);
+        let member = |number: usize| {
+            let kind = INDEXES[(first.unwrap_or(0) + number * APART) % INDEXES.len()];
+            let knobs = index_knobs(choice.seed, &format!("index knobs beside {number}"));
+            Member::new(kind.name, (kind.with)(&entries, &knobs))
+        };
+        let members = (0..BESIDE).map(member).collect();
         let boxes = Boxes::first(world);
-        Self { member, entries, boxes, middles: Vec::new(), shape: Shape::default() }
+        Self { members, entries, boxes, middles: Vec::new(), shape: Shape::default() }
     }
 
     /// Goes on to a frame, in its first view, and looks at it from every view.
@@ -95,15 +104,20 @@ impl Beside {
         if state.moment.view == 0 {
             if state.moment.frame > 0 {
                 self.boxes.advance(record.world);
-                // Half of the worlds tell it of what boxes alone know of, the others of all moves.
-                let alone = record.world.scene.seed % 2 == 0;
-                self.member.index.update(if alone { self.boxes.moves() } else { state.moves() });
+                // Told of what boxes alone know of, or of all moves, in turn.
+                for (number, member) in self.members.iter_mut().enumerate() {
+                    let alone = number % 2 == 0;
+                    member.index.update(if alone { self.boxes.moves() } else { state.moves() });
+                }
             }
             self.same_boxes(record)?;
             self.within_bounds(record)?;
         }
         let volume = Volume::new(&state.clip_from_world, record.world.scene.depth);
-        self.shape = self.member.hold(&state.boxes, &[volume])?;
+        for member in &mut self.members {
+            let shape = member.hold(&state.boxes, &[volume])?;
+            self.shape = self.shape.larger(shape);
+        }
         Ok(())
     }
 

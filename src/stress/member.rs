@@ -13,14 +13,11 @@ pub const RAREST_PAIR_ONE_IN: u64 = 1500;
 
 /// Families of which a member is picked only where another family's allows it: the family, the other, and the
 /// beginnings of the names of those of the other that leave it out.
-const LEFT_OUT: [(&str, &str, &[&str]); 7] = [
+const LEFT_OUT: [(&str, &str, &[&str]); 4] = [
     ("latency", "device", AT_ONCE),
     ("doubt", "device", AT_ONCE),
     ("misbehaviour", "device", AT_ONCE),
     ("limits", "culler", &["vfc", "draw-all", "simple", "chc "]),
-    ("picture", "size", &["large"]),
-    ("frames", "size", &["large"]),
-    ("leaf", "size", &["large"]),
 ];
 /// Devices without a clock.
 const AT_ONCE: &[&str] = &["Sim", "HierarchicalZ", "Tables", "hardware", "pyramid", "read-back"];
@@ -42,10 +39,24 @@ pub(super) fn may_meet(one: &str, other: &str) -> bool {
                 && members.iter().any(|begin| format!("{member} ").starts_with(begin))
         })
     };
+    // Large worlds are few: what they are to meet comes up in turn.
+    let large = |one: (&str, &str), other: (&str, &str)| {
+        one.0 == "size" && !["culler", "index"].contains(&other.0)
+    };
+    if large(one, other) || large(other, one) {
+        return false;
+    }
     one.0 != other.0 && !leaves_out(one, other) && !leaves_out(other, one)
 }
 
 impl Choice {
+    /// The names of what it picked: the family before the member.
+    #[must_use]
+    pub fn names(&self) -> Vec<String> {
+        let name = |(family, member)| format!("{family} {member}");
+        self.members().into_iter().map(name).collect()
+    }
+
     /// The family and the member of each, in the order of the families.
     #[must_use]
     pub fn members(&self) -> Vec<(&'static str, String)> {

@@ -45,7 +45,7 @@ pub enum Probe {
     LoadedAhead,
     /// A mesh was thrown out of memory.
     ThrownOut,
-    /// An index beside the run has ten levels or more.
+    /// An index beside the run has six levels or more.
     DeepIndex,
     /// An index beside the run has ten objects or more at one node.
     FullNode,
@@ -55,8 +55,10 @@ pub enum Probe {
     Large,
 }
 
-/// From so many levels on an index is deep, and from so many objects on a node full.
-const MANY: u32 = 10;
+/// From so many levels on an index is deep.
+const DEEP: u32 = 6;
+/// From so many objects on a node is full.
+const FULL: u32 = 10;
 
 /// Those that are of no culler.
 const OTHERS: [Probe; 20] = [
@@ -120,7 +122,7 @@ impl fmt::Display for Probe {
             Self::LoadedLate => "a draw waited for its mesh",
             Self::LoadedAhead => "a mesh loaded ahead was drawn",
             Self::ThrownOut => "a mesh was thrown out of memory",
-            Self::DeepIndex => "an index had ten levels or more",
+            Self::DeepIndex => "an index had six levels or more",
             Self::FullNode => "a node of an index had ten objects or more",
             Self::Strays => "objects stuck out of an index's root",
             Self::Large => "the world was large",
@@ -173,8 +175,8 @@ pub(super) struct Watch {
 impl Watch {
     /// Notes how large and deep an index is.
     pub(super) fn shape(&mut self, shape: Shape) {
-        self.reached.note(Probe::DeepIndex, shape.depth >= MANY);
-        self.reached.note(Probe::FullNode, shape.fullest >= MANY);
+        self.reached.note(Probe::DeepIndex, shape.depth >= DEEP);
+        self.reached.note(Probe::FullNode, shape.fullest >= FULL);
         self.reached.note(Probe::Strays, shape.strays && shape.depth > 0);
     }
 

@@ -49,15 +49,7 @@ impl Tally {
         for probe in &outcome.reached {
             *self.reached.entry(probe.clone()).or_default() += 1;
         }
-        for (place, member) in outcome.members.iter().enumerate() {
-            *count(&mut self.members, member) += 1;
-            if !self.pairs.contains_key(member) {
-                self.pairs.insert(member.clone(), BTreeMap::new());
-            }
-            if let Some(others) = self.pairs.get_mut(member) {
-                outcome.members[place + 1..].iter().for_each(|other| *count(others, other) += 1);
-            }
-        }
+        self.pick(&outcome.members);
         let ruling = outcome.ruling();
         self.ruling = self.ruling.max(ruling);
         if ruling != Ruling::Held {
@@ -81,6 +73,19 @@ impl Tally {
     pub fn probes(&self) -> Vec<(Probe, u64)> {
         let count = |probe: &Probe| self.reached.get(&probe.to_string()).copied().unwrap_or(0);
         Probe::all().map(|probe| (probe, count(&probe))).collect()
+    }
+
+    /// Counts what one world picked of each family.
+    fn pick(&mut self, members: &[String]) {
+        for (place, member) in members.iter().enumerate() {
+            *count(&mut self.members, member) += 1;
+            if !self.pairs.contains_key(member) {
+                self.pairs.insert(member.clone(), BTreeMap::new());
+            }
+            if let Some(others) = self.pairs.get_mut(member) {
+                members[place + 1..].iter().for_each(|other| *count(others, other) += 1);
+            }
+        }
     }
 
     /// Members with the number of worlds that picked each, the rarest first.
@@ -151,6 +156,8 @@ fn keep_most(kept: &mut Option<Outcome>, new: &Outcome, figure: &dyn Fn(&Outcome
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cull::CULLERS;
+    use crate::stress::Choice;
 
     fn outcome(seed: u64, drawn: u64, failures: &[&str]) -> Outcome {
         Outcome {
@@ -171,6 +178,36 @@ mod tests {
             hash: String::new(),
             replay: String::new(),
         }
+    }
+
+    /// What the first `worlds` seeds pick.
+    fn picked(worlds: u64) -> Tally {
+        let mut tally = Tally { worlds, ..Tally::default() };
+        for seed in 0..worlds {
+            tally.pick(&Choice::of(seed, CULLERS, &[]).names());
+        }
+        tally
+    }
+
+    /// No member and no pair is rare in a sweep of 3,000 worlds; a sweep in which one is says so.
+    #[test]
+    fn no_member_and_no_pair_is_rare() {
+        let tally = picked(3000);
+        assert_eq!(tally.rare(), Vec::<String>::new());
+        // There is none that such a sweep does not draw at all.
+        assert_eq!(tally.members().len(), picked(20_000).members().len());
+        for family in ["culler full-waits", "index list", "device Tables", "parts whole"] {
+            assert!(tally.members().iter().any(|(_, name)| *name == family), "{family}");
+        }
+        let two = |name| tally.pairs().iter().filter(|(_, pair)| pair.contains(&name)).count();
+        assert!(two("culler chc") > 60, "{}", two("culler chc"));
+        let mut uneven = tally.clone();
+        *uneven.members.get_mut("index list").unwrap() = 29;
+        *uneven.pairs.get_mut("culler chc").unwrap().get_mut("index list").unwrap() = 1;
+        assert_eq!(
+            uneven.rare(),
+            ["29 worlds: index list", "1 worlds: culler chc with index list"]
+        );
     }
 
     #[test]

@@ -204,7 +204,7 @@ fn ended(choice: &Choice, scene: String, wrong: Misbehaviour, watched: &mut Watc
         seed: choice.seed,
         options: choice.to_string(),
         scene,
-        members: names(choice),
+        members: choice.names(),
         shots: *shots,
         failures: gate.failures(),
         verdict: gate.word(),
@@ -228,7 +228,7 @@ impl Outcome {
             seed: choice.seed,
             options: choice.to_string(),
             scene: choice.scene().map_or_else(|error| error.to_string(), |scene| summary(&scene)),
-            members: names(choice),
+            members: choice.names(),
             shots: 0,
             failures: vec![format!("{}: {said}", check.name())],
             verdict: check.ruling().word().to_owned(),
@@ -280,7 +280,7 @@ fn outcome(
         seed: choice.seed,
         options: choice.to_string(),
         scene,
-        members: names(choice),
+        members: choice.names(),
         shots: trace.frames.len() as u32,
         failures: gate.failures(),
         verdict: gate.word(),
@@ -294,11 +294,6 @@ fn outcome(
         hash: format!("{:016x}", trace.hash()),
         replay: String::new(),
     }
-}
-
-/// What a world picked of each family, the family's name before the member's.
-fn names(choice: &Choice) -> Vec<String> {
-    choice.members().into_iter().map(|(family, member)| format!("{family} {member}")).collect()
 }
 
 /// What is in a scene, in a line.

@@ -3,9 +3,10 @@
 use glam::DVec3;
 use plainsight::cull::{CULLERS, CullerSetup, Item, ProxyKind, Scenery, SceneryKnobs};
 use plainsight::index::{
-    Entry, GridKnobs, INDEXES, Index, IrregularOctree, LazyGrid, LooseKnobs, Moves, NodeId,
-    RegularGrid, Split, TemporalVolumes, TreeKnobs, Work, bounds_octree, extents_octree,
-    loose_octree, octree, overlapping_octree, radius_octree,
+    BspKnobs, Entry, GridKnobs, INDEXES, Index, IrregularOctree, LazyGrid, LooseKnobs, Moves,
+    NodeId, RegularGrid, Split, TemporalVolumes, TreeKnobs, TwoLevelBsp, VolumeKnobs, Work,
+    bounds_octree, extents_octree, loose_octree, octree, overlapping_octree, promises,
+    radius_octree,
 };
 use plainsight::math::{Aabb, Volume};
 use plainsight::oracle::CostModel;
@@ -155,6 +156,7 @@ fn exercise(
         let at = format!("{name} step {step}");
         let check = |index: &dyn Index, boxes: &[Aabb]| {
             index.check(boxes).unwrap_or_else(|broken| panic!("{at}: {broken}"));
+            promises(index, boxes).unwrap_or_else(|broken| panic!("{at}: {broken}"));
         };
         check(index.as_ref(), &crowd.boxes);
         let volume = crowd.volume();
@@ -207,9 +209,7 @@ fn invariants_hold_after_every_step() {
 /// An index by its place in the family of those that take knobs.
 fn with_knobs(
     place: usize,
-    knobs: TreeKnobs,
-    loose: LooseKnobs,
-    grid: GridKnobs,
+    (knobs, loose, grid, volumes): (TreeKnobs, LooseKnobs, GridKnobs, VolumeKnobs),
     entries: &[Entry],
 ) -> Box<dyn Index> {
     match place {
@@ -222,8 +222,8 @@ fn with_knobs(
         6 => Box::new(IrregularOctree::new(entries, knobs)),
         7 => Box::new(LazyGrid::new(entries, grid)),
         8 => Box::new(RegularGrid::new(entries, grid)),
-        _ => Box::new(TemporalVolumes::new("volumes", entries, |held| {
-            with_knobs(place % 9, knobs, loose, grid, held)
+        _ => Box::new(TemporalVolumes::new("volumes", volumes, entries, |held| {
+            with_knobs(place % 9, (knobs, loose, grid, volumes), held)
         })),
     }
 }
@@ -235,13 +235,23 @@ fn any_knobs_hold() {
     let mut runner =
         TestRunner::new(Config { cases: 240, failure_persistence: None, ..Config::default() });
     let size = prop::sample::select(vec![0.5, 1.0, 2.0, 6.0, f64::INFINITY]);
-    let tree = (any::<bool>(), 0..9_u8, size, 1..20_u32, 0..6_u8, 0..6_u8, any::<[bool; 2]>());
-    let loose = (prop::sample::select(vec![0.1, 0.5, 0.75, 1.0]), any::<bool>());
-    let all = (0..18_usize, any::<u64>(), 0..120_usize, tree, loose, 0.5..40.0_f64);
+    // Both ends of each range as often as all that is between them.
+    let depth = prop_oneof![0..9_u8, Just(0), Just(TreeKnobs::DEEPEST)];
+    let capacity = prop_oneof![1..20_u32, Just(1), Just(u32::MAX)];
+    let start = prop_oneof![0..6_u8, Just(0), Just(TreeKnobs::DEEPEST)];
+    let ahead = prop_oneof![3..300_u32, Just(3)];
+    let tree =
+        (any::<bool>(), depth, size, capacity, start.clone(), start, ahead, any::<[bool; 2]>());
+    let loose = (prop::sample::select(vec![0.01, 0.1, 0.5, 0.75, 1.0]), any::<bool>());
+    let per_cell = prop_oneof![0.5..40.0_f64, Just(0.25), Just(1e9)];
+    let lives = (prop_oneof![1..8_u16, Just(1)], prop_oneof![1..9_u16, Just(1), Just(64)]);
+    let count = prop_oneof![0..120_usize, Just(0), Just(1)];
+    let all = (0..18_usize, any::<u64>(), count, tree, loose, (per_cell, lives));
     runner
-        .run(&all, |(place, seed, count, tree, (shrink, largest), per_cell)| {
-            let (flat, max_depth, size_divisor, capacity, start_depth, depth_reduction, [a, b]) =
+        .run(&all, |(place, seed, count, tree, (shrink, largest), (per_cell, lives))| {
+            let (flat, max_depth, size_divisor, capacity, start_depth, depth_reduction, ahead, on) =
                 tree;
+            let [checklists, leaf_boxes] = on;
             let knobs = TreeKnobs {
                 split: if flat { Split::Quadrants } else { Split::Octants },
                 max_depth,
@@ -249,16 +259,41 @@ fn any_knobs_hold() {
                 capacity,
                 start_depth,
                 depth_reduction,
-                checklists: a,
-                leaf_boxes: b,
+                checklists,
+                ahead,
+                leaf_boxes,
             };
-            let (loose, grid) = (LooseKnobs { shrink, largest }, GridKnobs { per_cell });
-            let build = |entries: &[Entry]| with_knobs(place, knobs, loose, grid, entries);
-            let name = format!("{place} {knobs:?} {loose:?} {grid:?}");
+            let (shortest, times) = lives;
+            let volumes = VolumeKnobs { shortest, longest: shortest * times };
+            let (loose, grid) = (LooseKnobs { shrink, largest }, GridKnobs { per_cell, ahead });
+            let all = (knobs, loose, grid, volumes);
+            let build = |entries: &[Entry]| with_knobs(place, all, entries);
+            let name = format!("{place} {all:?}");
             exercise(&name, &build, &mut Wanderers::new(seed, count), 24);
             Ok(())
         })
         .unwrap();
+}
+
+/// The scene tree holds by any of its knobs.
+#[test]
+fn any_knobs_of_the_scene_tree_hold() {
+    for (leaf_objects, period, worth, tighten_after) in
+        [(1, 1, 1, 0), (1, 1, 1, 1), (2, 2, 1, 0), (8, 3, 2, 4), (u32::MAX, 1, 1, 2)]
+    {
+        let knobs = BspKnobs {
+            leaf_objects,
+            reconstruction_period: period,
+            worth_reconstruction: worth,
+            tighten_after,
+        };
+        let build =
+            |entries: &[Entry]| -> Box<dyn Index> { Box::new(TwoLevelBsp::with(entries, knobs)) };
+        for (seed, count) in [(7, 0), (8, 1), (9, 60), (10, 200)] {
+            let name = format!("{knobs:?} seed {seed}");
+            exercise(&name, &build, &mut Wanderers::new(seed, count), 40);
+        }
+    }
 }
 
 /// The scenes of Wortel 2011 with occlusion: nothing in plain sight is culled over any index.
