@@ -6,6 +6,7 @@ use clap::Args;
 use rayon::prelude::*;
 use serde_json::json;
 
+use super::blocks::{self, trial_in_swarm};
 use super::progress::progress_bar;
 use super::run::{catch_interrupt, interrupted};
 use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
@@ -42,6 +43,11 @@ pub(super) struct FaultsArgs {
     #[arg(long, value_name = "SEEDS", num_args = 0..=1, default_missing_value = "2000",
         value_parser = clap::value_parser!(u64).range(1..), conflicts_with_all = ["scene", "seed", "seeds", "frames"])]
     swarm: Option<u64>,
+    /// With --swarm: over so many blocks of 1000 seeds each (0.., 1000.. and on), the median of how many
+    /// seeds it takes until a fault is first caught.
+    #[arg(long, value_name = "BLOCKS", requires = "swarm",
+        value_parser = clap::value_parser!(u64).range(1..=1000))]
+    blocks: Option<u64>,
     /// One JSON object a fault on standard output in place of the table.
     #[arg(long)]
     json: bool,
@@ -214,14 +220,8 @@ impl Hunt {
         let mut hunt = Self { fault, found: Vec::new(), run: 0, false_alarms: Vec::new() };
         while hunt.run < most && hunt.found.len() < FINDS {
             let seeds: Vec<u64> = (hunt.run..(hunt.run + CHUNK).min(most)).collect();
-            let evidence: Vec<Result<Evidence, CliError>> = seeds
-                .par_iter()
-                .map(|&seed| {
-                    let choice = Choice::of(seed, CULLERS, &[]);
-                    let trial = Trial::of(&fault, &choice.scene()?, choice.partition);
-                    Ok(trial.run(&fault, &mut || !interrupted())?)
-                })
-                .collect();
+            let evidence: Vec<Result<Evidence, CliError>> =
+                seeds.par_iter().map(|&seed| trial_in_swarm(&fault, seed)).collect();
             for (seed, evidence) in seeds.into_iter().zip(evidence) {
                 let evidence = evidence?;
                 if evidence.caught() {
@@ -322,8 +322,13 @@ fn hunt(args: &FaultsArgs, most: u64, streams: &mut Streams<'_>) -> Result<u8, C
 }
 
 pub(super) fn faults(args: &FaultsArgs, streams: &mut Streams<'_>) -> Result<u8, CliError> {
-    if let Some(most) = args.swarm {
-        return hunt(args, most, streams);
+    match (args.swarm, args.blocks) {
+        (Some(most), Some(blocks)) => {
+            let (chosen, out) = (pick(&args.fault)?, args.out.as_deref());
+            return blocks::hunt(&chosen, (blocks, most), (args.json, out), streams);
+        }
+        (Some(most), None) => return hunt(args, most, streams),
+        (None, _) => {}
     }
     let out = args.out.as_deref().map(OutFile::create).transpose()?;
     let chosen = pick(&args.fault)?;

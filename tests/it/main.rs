@@ -22,6 +22,7 @@ mod margins;
 mod memory;
 mod oracle;
 mod partition;
+mod paths;
 mod proxies;
 mod readers;
 mod report;

@@ -1,0 +1,147 @@
+//! `faults --swarm --blocks`: how many seeds of the swarm it takes until a fault is caught, as a median over
+//! disjoint blocks of seeds that are the same for everybody.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use serde_json::json;
+
+use super::progress::progress_bar;
+use super::run::{catch_interrupt, interrupted};
+use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
+use crate::cull::CULLERS;
+use crate::fault::{Evidence, Fault, Trial};
+use crate::stress::Choice;
+
+/// Version of the JSON line.
+const JSON_SCHEMA: u32 = 1;
+/// Seeds from the start of one block to the next.
+const BLOCK: u64 = 1000;
+
+/// The trial of a fault in the world of a seed.
+pub(super) fn trial_in_swarm(fault: &Fault, seed: u64) -> Result<Evidence, CliError> {
+    let choice = Choice::of(seed, CULLERS, &[]);
+    let trial = Trial::of(fault, &choice.scene()?, choice.partition);
+    Ok(trial.run(fault, &mut || !interrupted())?)
+}
+
+/// How many seeds of each block it took until a fault was first caught there.
+struct Blocks {
+    fault: Fault,
+    /// By block; `None` where none of its seeds caught it.
+    waits: Vec<Option<u64>>,
+    /// What the gate said of the unbroken rig.
+    false_alarms: Vec<String>,
+}
+
+impl Blocks {
+    /// Looks at the first `most` seeds of each block, at most a whole one, until one catches the fault.
+    fn new(fault: Fault, blocks: u64, most: u64) -> Result<Self, CliError> {
+        let of = |block: u64| -> Result<(Option<u64>, Vec<String>), CliError> {
+            let mut alarms = Vec::new();
+            for wait in 1..=most.min(BLOCK) {
+                let seed = block * BLOCK + wait - 1;
+                let evidence = trial_in_swarm(&fault, seed)?;
+                let lines = evidence.false_alarms.iter();
+                alarms.extend(lines.map(|line| format!("seed {seed}: {line}")));
+                if evidence.caught() {
+                    return Ok((Some(wait), alarms));
+                }
+            }
+            Ok((None, alarms))
+        };
+        let done: Vec<_> = (0..blocks).into_par_iter().map(of).collect();
+        let mut all = Self { fault, waits: Vec::new(), false_alarms: Vec::new() };
+        for block in done {
+            let (wait, alarms) = block?;
+            all.waits.push(wait);
+            all.false_alarms.extend(alarms);
+        }
+        Ok(all)
+    }
+
+    /// The middle one of the waits, the upper of two, and the longest; `None` where that block never caught
+    /// it.
+    fn median_and_most(&self) -> [Option<u64>; 2] {
+        let mut waits = self.waits.clone();
+        // What was never caught took longest.
+        waits.sort_unstable_by_key(|wait| wait.unwrap_or(u64::MAX));
+        [waits[waits.len() / 2], waits[waits.len() - 1]]
+    }
+
+    fn json(&self) -> String {
+        let [median, most] = self.median_and_most();
+        json!({
+            "schema": JSON_SCHEMA,
+            "fault": self.fault.name,
+            "bug_class": self.fault.bug,
+            "blocks": self.waits.len(),
+            "block_seeds": BLOCK,
+            "seeds_until_caught": self.waits,
+            "median_seeds": median,
+            "most_seeds": most,
+            "false_alarms": self.false_alarms,
+        })
+        .to_string()
+    }
+}
+
+/// Looks for each fault in blocks of seeds of the swarm.
+pub(super) fn hunt(
+    chosen: &[Fault],
+    (blocks, most): (u64, u64),
+    (json, out): (bool, Option<&Path>),
+    streams: &mut Streams<'_>,
+) -> Result<u8, CliError> {
+    let mut out = out.map(OutFile::create).transpose()?;
+    catch_interrupt();
+    let bar = progress_bar();
+    bar.set_length(chosen.len() as u64);
+    let wide = chosen.iter().map(|fault| fault.name.len()).max().unwrap_or(0).max(5);
+    if !json {
+        writeln!(streams.out, "{:<wide$} class  median of {blocks} blocks  longest", "fault")?;
+    }
+    let (mut caught, mut alarms) = (0, 0);
+    for &fault in chosen {
+        bar.set_message(fault.name);
+        let found = Blocks::new(fault, blocks, most);
+        if found.is_err() {
+            bar.finish_and_clear();
+        }
+        let found = found?;
+        bar.inc(1);
+        let line = found.json();
+        if let Some(out) = &mut out {
+            out.line(&line)?;
+        }
+        let [median, longest] = found.median_and_most();
+        let said = |wait: Option<u64>| wait.map_or("NEVER".to_owned(), |wait| wait.to_string());
+        let text = match json {
+            true => line,
+            false => format!(
+                "{:<wide$} {:>5}  {:>19}  {:>7}",
+                fault.name,
+                fault.bug,
+                said(median),
+                said(longest)
+            ),
+        };
+        bar.suspend(|| writeln!(streams.out, "{text}"))?;
+        for alarm in &found.false_alarms {
+            bar.suspend(|| writeln!(streams.talk, "FALSE ALARM: {} {alarm}", fault.sound.name))?;
+        }
+        alarms += found.false_alarms.len();
+        caught += usize::from(median.is_some());
+    }
+    bar.finish_and_clear();
+    if let Some(out) = out {
+        out.finish(&[])?;
+    }
+    let to = if json { &mut streams.talk } else { &mut streams.out };
+    writeln!(
+        to,
+        "faults: {caught} of {} have a median over {blocks} blocks of {BLOCK} seeds; false alarms {alarms}",
+        chosen.len()
+    )?;
+    Ok(if caught == chosen.len() && alarms == 0 { EXIT_HELD } else { EXIT_FAILED })
+}
