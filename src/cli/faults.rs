@@ -10,11 +10,9 @@ use super::blocks::{self, trial_in_swarm};
 use super::progress::progress_bar;
 use super::run::{catch_interrupt, interrupted};
 use super::{CliError, EXIT_FAILED, EXIT_HELD, OutFile, Streams};
-use crate::cull::CULLERS;
 use crate::fault::{self, Evidence, Fault, Harm, OTHERS, SOUND, Trial, faults as all_faults};
 use crate::run::World;
 use crate::scene::generate::HARD;
-use crate::stress::Choice;
 
 /// Version of the JSON line.
 const JSON_SCHEMA: u32 = 1;

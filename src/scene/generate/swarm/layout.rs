@@ -76,6 +76,16 @@ pub(super) fn placed(chosen: &Chosen, layout: &mut Stream, shapes: &[Shape]) -> 
         }
         Layout::Scattered | Layout::Grid | Layout::Heap => {}
     }
+    // Flat sheets at the ends of the world, beyond all that stands in the space.
+    if layout.below(5) == 0 {
+        for axis in DVec3::AXES {
+            for side in [-1.0, 1.0] {
+                let at = within(&mut place, DVec3::splat(SPACE * 0.7)) * (DVec3::ONE - axis);
+                let out = axis * (side * SPACE * place.range(1.3, 1.6));
+                put(0, wall(at + out, (DVec3::ONE - axis) * SPACE * 0.4));
+            }
+        }
+    }
     for _ in 0..count {
         let reach = match kind {
             Layout::Heap => DVec3::splat(SPACE * 0.15),
