@@ -145,3 +145,22 @@ pub(super) fn hunt(
     )?;
     Ok(if caught == chosen.len() && alarms == 0 { EXIT_HELD } else { EXIT_FAILED })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fault::faults;
+
+    /// What was never caught took longest; of an even number of blocks the worse of the two in the middle.
+    #[test]
+    fn the_median_is_over_all_blocks() {
+        let of = |waits: &[Option<u64>]| {
+            let (waits, false_alarms) = (waits.to_vec(), Vec::new());
+            Blocks { fault: faults()[0], waits, false_alarms }.median_and_most()
+        };
+        assert_eq!(of(&[Some(9), Some(2), Some(4)]), [Some(4), Some(9)]);
+        assert_eq!(of(&[Some(9), None, Some(4)]), [Some(9), None]);
+        assert_eq!(of(&[None, None, Some(4)]), [None, None]);
+        assert_eq!(of(&[Some(1), Some(7)]), [Some(7), Some(7)]);
+    }
+}

@@ -6,12 +6,13 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::layout::by_middle;
 use super::shapes::Shape;
 use super::{Site, power, within};
 use crate::scene::generate::Chosen;
 use crate::scene::generate::rim::{SIDES, edge, longest, reaching};
 use crate::scene::generate::shape::Builder;
-use crate::scene::{CameraPath, Object, Stream};
+use crate::scene::{CameraPath, Object, Placement, Stream};
 
 /// Most objects of this kind at scale 1.
 const MOST: u32 = 8;
@@ -30,8 +31,8 @@ pub(super) fn add(
     if fringe.below(ONE_IN) > 0 {
         return;
     }
-    // Bars that are stretched to poles, or leaned on by a shear; both or one of the two.
-    let kinds = fringe.pick(&[&[0][..], &[1], &[0, 1]]);
+    // Bars that are stretched to poles or leaned on by a shear, and blocks; some of them or all.
+    let kinds = fringe.pick(&[&[0][..], &[1], &[0, 1], &[2], &[0, 1, 2]]);
     let count = (f64::from(1 + fringe.below(MOST)) * chosen.scale).ceil() as u32;
     for _ in 0..count {
         let path = &cameras[fringe.below(cameras.len() as u32) as usize];
@@ -49,7 +50,16 @@ pub(super) fn add(
         let inside = (arm * power(&mut fringe, -2.5, -0.6)).max(pixel * fringe.range(0.5, 3.0));
         let towards = (inward + within(&mut fringe, DVec3::splat(0.5))).normalize();
         let mirrored = DVec3::from_array([0; 3].map(|_| fringe.pick(&[1.0, 1.0, -1.0])));
-        let (scale, shear, tip, radius) = match fringe.pick(kinds) {
+        let kind = fringe.pick(kinds);
+        if kind == 2 {
+            // Not turned, so that its box is no larger than it is; a corner in by a pixel or so.
+            let corner = inward.signum() * high * power(&mut fringe, -2.0, -0.5);
+            let at = point + inward * (pixel * fringe.range(0.5, 4.0)) - corner;
+            let placement = Placement { scale: corner.abs() * 2.0, ..Placement::at(at) };
+            objects.push(Object { mesh: 0, placement: by_middle(placement, shapes[0].middle) });
+            continue;
+        }
+        let (scale, shear, tip, radius) = match kind {
             0 => {
                 let aside = DVec3::from_array([0; 3].map(|_| thick * fringe.range(0.5, 1.5)));
                 let axis = DVec3::AXES[fringe.below(3) as usize];
