@@ -7,6 +7,7 @@ use clap::Args;
 use rayon::prelude::*;
 use serde_json::json;
 
+use super::blocks::{self, trial_in_swarm};
 use super::files::Files;
 use super::progress::progress_bar;
 use super::run::exit_of;
@@ -14,11 +15,9 @@ use super::signals::{catch_interrupt, interrupted};
 use super::watchdog::{FrameLimit, Hung, SharedFile, Watchdog};
 use super::{CliError, Outputs, Streams};
 use crate::check::Ruling;
-use crate::cull::CULLERS;
 use crate::fault::{self, Evidence, Fault, Harm, OTHERS, SOUND, Trial, faults as all_faults};
 use crate::run::{Canary, World};
 use crate::scene::generate::HARD;
-use crate::stress::Choice;
 
 /// Version of the JSON line.
 const JSON_SCHEMA: u32 = 1;
@@ -47,6 +46,11 @@ pub(super) struct FaultsArgs {
     #[arg(long, value_name = "SEEDS", num_args = 0..=1, default_missing_value = "2000",
         value_parser = clap::value_parser!(u64).range(1..), conflicts_with_all = ["scene", "seed", "seeds", "frames"])]
     swarm: Option<u64>,
+    /// With --swarm: over so many blocks of 1000 seeds each (0.., 1000.. and on), the median of how many
+    /// seeds it takes until a fault is first caught.
+    #[arg(long, value_name = "BLOCKS", requires = "swarm",
+        value_parser = clap::value_parser!(u64).range(1..=1000))]
+    blocks: Option<u64>,
     /// One JSON object a fault on standard output in place of the table.
     #[arg(long)]
     json: bool,
@@ -241,15 +245,8 @@ impl Hunt {
         let mut hunt = Self { fault, found, run: 0, false_alarms, alarm };
         while hunt.run < most && hunt.found.len() < FINDS {
             let seeds: Vec<u64> = (hunt.run..(hunt.run + CHUNK).min(most)).collect();
-            let evidence: Vec<Result<Evidence, CliError>> = seeds
-                .par_iter()
-                .map(|&seed| {
-                    let choice = Choice::of(seed, CULLERS, &[]);
-                    let trial = Trial::of(&fault, &choice.scene()?, choice.partition);
-                    let trial = trial.with_canary(canary);
-                    Ok(trial.run(&fault, &mut || !interrupted())?)
-                })
-                .collect();
+            let evidence: Vec<Result<Evidence, CliError>> =
+                seeds.par_iter().map(|&seed| trial_in_swarm(&fault, seed, canary)).collect();
             for (seed, evidence) in seeds.into_iter().zip(evidence) {
                 let evidence = evidence?;
                 if evidence.caught() {
@@ -364,8 +361,19 @@ pub(super) fn faults(
     outputs: &mut Outputs<'_>,
     streams: &mut Streams<'_>,
 ) -> Result<u8, CliError> {
-    if let Some(most) = args.swarm {
-        return hunt(args, most, outputs, streams);
+    match (args.swarm, args.blocks) {
+        (Some(most), Some(blocks)) => {
+            let out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
+            let mut out = SharedFile::new(out);
+            let (now, watchdog) = watched(args, &out);
+            let seen = &mut |fault: &Fault| set(&now, fault.name);
+            let (blocks, to) = ((blocks, most, args.canary), (args.json, &mut out));
+            let code = blocks::hunt(&pick(&args.fault)?, blocks, seen, to, streams);
+            drop(watchdog);
+            return code;
+        }
+        (Some(most), None) => return hunt(args, most, outputs, streams),
+        (None, _) => {}
     }
     let out = args.out.as_deref().map(|path| outputs.file("--out", path)).transpose()?;
     let mut out = SharedFile::new(out);
@@ -418,7 +426,7 @@ pub(super) fn faults(
 fn watched(args: &FaultsArgs, out: &SharedFile<'_>) -> (Arc<Mutex<String>>, Watchdog) {
     let now = Arc::new(Mutex::new(String::new()));
     let (fault, out) = (Arc::clone(&now), out.at_hang());
-    let (swarm, limit) = (args.swarm, args.frame_limit);
+    let (swarm, blocks, limit) = (args.swarm, args.blocks, args.frame_limit);
     let keep = move |hung: &mut Hung| {
         let fault = fault.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let mut line = "plainsight faults".to_owned();
@@ -426,7 +434,10 @@ fn watched(args: &FaultsArgs, out: &SharedFile<'_>) -> (Arc<Mutex<String>>, Watc
             line += &format!(" --fault {fault}");
         }
         line += &match swarm {
-            Some(most) => format!(" --swarm {most}"),
+            Some(most) => {
+                let blocks = blocks.map_or(String::new(), |blocks| format!(" --blocks {blocks}"));
+                format!(" --swarm {most}{blocks}")
+            }
             None => format!(" --scene {} --seed {}", hung.scene, hung.seed),
         };
         hung.replay = line + &limit.replay_flags();

@@ -4,6 +4,7 @@
 
 mod accuracy;
 mod args;
+mod blocks;
 mod calibrate;
 mod compare;
 mod export;

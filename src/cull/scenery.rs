@@ -356,13 +356,7 @@ impl Scenery {
     /// [`TIGHTER_LEVELS`] down, while their surface together is within [`TIGHTER_SURFACE`] of the
     /// node's (Mattausch, Bittner & Wimmer 2008, section 4.2). Where any of them cannot be asked about,
     /// `proxy` stays. Appends nothing where none of them can be on any sample.
-    pub(super) fn tighter_proxies(
-        &self,
-        view: &View<'_>,
-        item: Item,
-        proxy: Proxy,
-        out: &mut Vec<Proxy>,
-    ) {
+    pub fn tighter_proxies(&self, view: &View<'_>, item: Item, proxy: Proxy, out: &mut Vec<Proxy>) {
         let Item::Object(object, node) = item else { return out.push(proxy) };
         let Some(tree) = &self.partition.mesh(object).tree else { return out.push(proxy) };
         let surface = |node: u32| {
@@ -385,7 +379,7 @@ impl Scenery {
     }
 
     /// What to ask about in the place of `proxy`, that of a part: the part's several boxes, neighbours
-    /// taken together until there are at most `most`. For what is no part, boxes some levels below it.
+    /// taken together until there are at most `most`. For what is no part, as `tighter_proxies`.
     pub fn tightest_proxies(
         &self,
         view: &View<'_>,

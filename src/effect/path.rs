@@ -138,6 +138,70 @@ mod tests {
         assert_eq!(reflect(7.0, 2.0, 2.0), 2.0);
     }
 
+    fn reflect_path(velocity: DVec3, spin: f64) -> Path {
+        Path::Reflect { velocity, min: DVec3::new(-7.0, 1.0, 2.0), max: DVec3::splat(5.0), spin }
+    }
+
+    fn circuit_path(corners: &[DVec3], speed: f64) -> Path {
+        Path::Circuit { corners: corners.to_vec(), speed, start: 0.25 }
+    }
+
+    fn lap_path(round: f64, speed: f64) -> Path {
+        Path::Lap { center: DVec3::new(-3.0, 8.0, 1.0), half: [4.0, 6.0], round, speed, start: 0.0 }
+    }
+
+    /// A step is the way and the turn: of a turn the arc, or the diameter where that is less; at a corner
+    /// the whole diameter.
+    #[test]
+    fn steps_are_the_way_and_the_turn() {
+        let run = DVec3::new(3.0, 4.0, 12.0);
+        assert_eq!(step_bound(&reflect_path(run, 0.0), 10.0), 13.0);
+        assert_eq!(step_bound(&reflect_path(run, -0.5), 10.0), 13.0 + 5.0);
+        assert_eq!(step_bound(&reflect_path(DVec3::ZERO, 1.5), 10.0), 15.0, "in place");
+        assert_eq!(step_bound(&reflect_path(DVec3::ZERO, -3.0), 10.0), 20.0, "the diameter");
+        assert_eq!(step_bound(&circuit_path(&[DVec3::ZERO, DVec3::X], -0.5), 10.0), 20.5);
+        assert_eq!(step_bound(&lap_path(2.0, -1.0), 10.0), 1.0 + 5.0, "by the corner's radius");
+        assert_eq!(
+            step_bound(&lap_path(9.0, 1.0), 10.0),
+            1.0 + 2.5,
+            "no rounder than there is room"
+        );
+        assert_eq!(step_bound(&lap_path(0.125, 1.0), 10.0), 1.0 + 20.0);
+    }
+
+    /// There and back on a line: at each end the object turns right about, and half of the bound's turn
+    /// would not do. A point beside the path goes twice its distance.
+    #[test]
+    fn corners_take_all_of_the_turn() {
+        let path = circuit_path(&[DVec3::ZERO, DVec3::X * 4.0], 0.5);
+        let at = |t: u32, arm: DVec3| {
+            let (origin, turn) = place(&path, DVec3::ZERO, t);
+            origin + turn * arm
+        };
+        for arm in [DVec3::X * 3.0, DVec3::Z * 3.0, DVec3::new(2.0, 9.0, -1.0)] {
+            let offset = arm.with_y(0.0).length();
+            let steps = (0..40).map(|t| at(t, arm).distance(at(t + 1, arm)));
+            let most = steps.fold(0.0, f64::max);
+            assert!(most <= step_bound(&path, offset) * STEP_SLACK, "{arm}: {most}");
+            assert!(most > 0.5 + offset, "{arm}: {most}");
+        }
+    }
+
+    #[test]
+    fn what_turns_is_told() {
+        assert!(!turns(&reflect_path(DVec3::ONE, 0.0)));
+        assert!(turns(&reflect_path(DVec3::ZERO, 1e-9)) && turns(&reflect_path(DVec3::ZERO, -1.0)));
+        assert!(turns(&circuit_path(&[DVec3::ZERO, DVec3::X], 0.0)) && turns(&lap_path(1.0, 0.0)));
+    }
+
+    #[test]
+    fn extents_are_the_farthest_coordinates() {
+        assert_eq!(extent(&reflect_path(DVec3::ONE, 0.0)), 7.0);
+        let corners = [DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.0, -9.0, 4.0)];
+        assert_eq!(extent(&circuit_path(&corners, 1.0)), 9.0);
+        assert_eq!(extent(&lap_path(1.0, 1.0)), 8.0 + 6.0);
+    }
+
     #[test]
     fn circuit_comes_round() {
         let square = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 0.0, 1.0), DVec3::Z];

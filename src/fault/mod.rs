@@ -9,6 +9,9 @@
 //! |---|---|
 //! | `two_pass` | a culler as engines have it: projections, tests, lists, views |
 //! | `spheres` | spheres against planes |
+//! | `blocks` | objects by the blocks of space that they are in |
+//! | `volumes` | a tree of boxes in f32 |
+//! | `shadows` | what lies in the shadow of a triangle |
 //! | `sight` | what a sound culler is shown |
 //! | `history` | what `full` remembers |
 //! | `pyramid` | hierarchical z |
@@ -16,13 +19,16 @@
 //! | `structure` | the scene tree's upkeep, the cut |
 
 mod answers;
+mod blocks;
 mod history;
 mod pyramid;
+mod shadows;
 mod sight;
 mod spheres;
 mod structure;
 mod trial;
 mod two_pass;
+mod volumes;
 
 use crate::cull::{Culler, CullerSetup};
 use crate::index::{Entry, Index};
@@ -106,7 +112,7 @@ impl Fault {
 }
 
 /// How many bug classes the list has.
-pub const BUG_CLASSES: u8 = 60;
+pub const BUG_CLASSES: u8 = 69;
 
 /// Every seeded fault, by number of its bug class.
 #[must_use]
@@ -114,6 +120,9 @@ pub fn faults() -> Vec<Fault> {
     let families = [
         two_pass::FAULTS,
         spheres::FAULTS,
+        blocks::FAULTS,
+        volumes::FAULTS,
+        shadows::FAULTS,
         sight::FAULTS,
         history::FAULTS,
         pyramid::FAULTS,
@@ -126,8 +135,16 @@ pub fn faults() -> Vec<Fault> {
 }
 
 /// The sound rigs that faults are broken forms of.
-pub const SOUND: &[Rig] =
-    &[history::FULL, history::VFC, two_pass::EXACT, two_pass::PYRAMID, spheres::RIG];
+pub const SOUND: &[Rig] = &[
+    history::FULL,
+    history::VFC,
+    two_pass::EXACT,
+    two_pass::PYRAMID,
+    spheres::RIG,
+    blocks::RIG,
+    volumes::RIG,
+    shadows::RIG,
+];
 
 /// Bug classes that are no fault of a culler's as it is here, with what holds them or what they await.
 pub const OTHERS: &[(u8, &str)] = &[
@@ -167,6 +184,14 @@ pub const HARD_CASES: &[(u8, &[&str])] = &[
     (40, &["hard/cusp", "hard/ping-pong"]),
     (42, &[]),
     (49, &[]),
+    (61, &["hard/spars"]),
+    (62, &["hard/poles"]),
+    (63, &["hard/crossed-spars"]),
+    (64, &["hard/world-edge"]),
+    (65, &["hard/endless-sides"]),
+    (66, &["hard/parallel-shadow"]),
+    // A face parallel to the screen, which is its own box's front.
+    (69, &["hard/pinholes", "hard/touching"]),
 ];
 
 #[cfg(test)]

@@ -81,6 +81,24 @@ impl PyramidRules for LowResolution {
     }
 }
 
+/// Occluders in a buffer of half the columns and rows, a quarter of the pixels: a texel is covered where
+/// any of its samples is.
+struct QuarterCoverage;
+
+impl PyramidRules for QuarterCoverage {
+    fn level_0(width: usize, depths: Vec<f32>) -> Vec<f32> {
+        let height = depths.len() / width;
+        let covered = |i: usize| {
+            let (x, y) = (i % width / 2 * 2, i / width / 2 * 2);
+            let at = |dx: usize, dy: usize| {
+                depths[(y + dy).min(height - 1) * width + (x + dx).min(width - 1)]
+            };
+            at(0, 0).min(at(1, 0)).min(at(0, 1)).min(at(1, 1))
+        };
+        (0..depths.len()).map(covered).collect()
+    }
+}
+
 /// Samples that one thread writes.
 const BAND: usize = 16_384;
 /// How far the next thread is off.
@@ -157,5 +175,11 @@ pub(super) const FAULTS: &[Fault] = &[
         "every second thread writes at a wrong offset, in large images alone",
         &["hard/orthographic", "hard/pinholes"],
         (two_pass::PYRAMID, by!(ThreadOffset)),
+    ),
+    Fault::drops(
+        ("quarter-coverage", 69),
+        "occluders at a quarter of the pixels cover all of a texel that they touch",
+        &["hard/pinholes", "hard/grazing"],
+        (two_pass::PYRAMID, by!(QuarterCoverage)),
     ),
 ];

@@ -272,6 +272,8 @@ pub(super) fn floor_f32(value: f64) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
 
     const FORWARD: DepthOrder = DepthOrder::Forward;
@@ -287,6 +289,25 @@ mod tests {
         assert_eq!(RECTANGLE_DILATION_PIXELS, 2.0 * power(-4.0));
         assert_eq!(DEPTH_ROUNDING, 6.0 * power(-24.0));
         assert_eq!(CORNER_GAMMA, 8.0 * power(-53.0));
+    }
+
+    /// A box's error is that of its contents and the rounding of its own corners, row by row; of a box whose
+    /// corners all have w = 1 too.
+    #[test]
+    fn the_rounding_of_corners_is_added() {
+        let rows = [[2.0, -1.0, 4.0, 8.0], [0.5, 1.0, -2.0, 0.0], [0.0, 0.0, -1.0, 3.0]];
+        let aabb = Aabb::new(DVec3::new(-4.0, 1.0, -1.0), DVec3::new(2.0, 16.0, 0.5));
+        let [bound, reach] = [[1.0, 2.0, 4.0, 8.0].map(|e| e / 1e6), [4.0, 16.0, 1.0, 1.0]];
+        for last in [[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, -2.0, 64.0]] {
+            let rows = [rows[0], rows[1], rows[2], last];
+            let matrix = DMat4::from_cols_array_2d(&rows).transpose();
+            let clip = ClipBox::new(&aabb, &matrix, &ClipError { bound }, FORWARD);
+            for (place, row) in rows.iter().enumerate() {
+                let sum: f64 =
+                    row.iter().zip(reach).map(|(entry, reach)| entry.abs() * reach).sum();
+                assert_eq!(clip.error[place], bound[place] + sum * CORNER_GAMMA);
+            }
+        }
     }
 
     #[test]

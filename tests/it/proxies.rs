@@ -52,7 +52,16 @@ enum Kind {
     Rectangle,
     Hull,
     Box,
+    /// The rectangle of a node above: of the box in the world, with the bound that was handed up.
+    Node,
+    /// The node's hull.
+    NodeHull,
+    /// The rectangle of a part's own box, which is smaller than its mesh's, with the mesh's bound.
+    Part,
 }
+
+const KINDS: [Kind; 6] =
+    [Kind::Rectangle, Kind::Hull, Kind::Box, Kind::Node, Kind::NodeHull, Kind::Part];
 
 /// What the proxies are made with: the margins, and the share of the transform bound.
 #[derive(Clone, Copy, Debug)]
@@ -191,8 +200,20 @@ impl Case {
         let world = DMat4::from_translation(place) * turn * DMat4::from_translation(-middle);
         let near = distance * if stream.below(2) == 0 { 0.01 } else { stream.range(0.3, 0.999) };
         let far = near * power(stream, 1.0, 6.0) + 4.0 * size;
-        let (eye, forward) = (DVec3::ZERO, DVec3::NEG_Z);
-        let lens = Lens::perspective(1.0);
+        // Now and then all of it, eye and object, ten thousand to a million units from the world's origin.
+        let eye = match stream.below(3) {
+            0 => DVec3::from_array([0; 3].map(|_| {
+                let far = power(stream, 4.0, 6.0);
+                if stream.below(2) == 0 { far } else { -far }
+            })),
+            _ => DVec3::ZERO,
+        };
+        let world = DMat4::from_translation(eye) * world;
+        let forward = DVec3::NEG_Z;
+        let lens = match stream.below(4) {
+            0 => Lens::Orthographic { height: 1.1 * distance },
+            _ => Lens::perspective(1.0),
+        };
         let clip = Camera { eye, forward, lens, near, far }.clip_from_world(VIEWPORT, order);
         let corner = |stream: &mut Stream| stream.below(8);
         let triangles = (0..1 + stream.below(3)).map(|_| [0; 3].map(|_| corner(stream))).collect();
@@ -262,12 +283,27 @@ impl Case {
         drawn.map(|sample| Shown { sample, depth: image.depth(sample) }).collect()
     }
 
+    /// The box that stands in, and its matrix.
+    fn stand_in(&self, kind: Kind) -> (Aabb, DMat4) {
+        let bounds = self.bounds();
+        match kind {
+            Kind::Rectangle | Kind::Hull | Kind::Box => (bounds, self.clip * self.world),
+            Kind::Node | Kind::NodeHull => (bounds.transformed(&self.world), self.clip),
+            Kind::Part => {
+                let corners = self.corners();
+                let used = self.triangles.iter().flatten().map(|&corner| &corners[corner as usize]);
+                (Aabb::of_points(used), self.clip * self.world)
+            }
+        }
+    }
+
     /// The proxy; `Err` says whether the box counts as visible unasked.
     fn proxy(&self, kind: Kind, proof: &Proof) -> Result<Proxy, bool> {
-        let (matrix, error) = self.matrices();
+        let (_, error) = self.matrices();
         let error = ClipError { bound: error.bound.map(|bound| bound * proof.transform) };
         let pixels = (VIEWPORT.width, VIEWPORT.height);
-        let clip = ClipBox::new(&self.bounds(), &matrix, &error, self.order);
+        let (bounds, matrix) = self.stand_in(kind);
+        let clip = ClipBox::new(&bounds, &matrix, &error, self.order);
         match clip.project_with(pixels.0, pixels.1, &proof.margins) {
             Projection::Nowhere => Err(false),
             Projection::Unbounded => Err(true),
@@ -275,8 +311,8 @@ impl Case {
                 let (min, max) = (rectangle.min, rectangle.max);
                 let plain = Proxy::Rectangle { min, max, depth };
                 match kind {
-                    Kind::Rectangle => Ok(plain),
-                    Kind::Hull => {
+                    Kind::Rectangle | Kind::Node | Kind::Part => Ok(plain),
+                    Kind::Hull | Kind::NodeHull => {
                         match clip.outline_with(pixels, (rectangle, depth), &proof.margins) {
                             Outline::Nowhere => Err(false),
                             Outline::Rectangle => Ok(plain),
@@ -286,7 +322,6 @@ impl Case {
                         }
                     }
                     Kind::Box => {
-                        let bounds = self.bounds();
                         let grown = inflated_box_with(
                             &bounds,
                             &matrix,
@@ -475,7 +510,7 @@ fn attack(name: &str, order: DepthOrder, starts: u32) -> Tally {
     search((name, order), starts, &[REFERENCE, COARSE], |case, device, shown, room| {
         tally.cases += 1;
         tally.samples += shown.len() as u64;
-        for kind in [Kind::Rectangle, Kind::Hull, Kind::Box] {
+        for kind in KINDS {
             let miss = missed(case, (kind, device, &PROVEN), shown, room);
             assert!(miss.is_none(), "{kind:?} misses {miss:?} on {device:?}: {case:?}");
             if let Ok(proxy) = case.proxy(kind, &PROVEN) {
@@ -565,7 +600,7 @@ fn the_search_finds_what_each_margin_is_for() {
         p.transform = 0.0;
         (p.margins.box_pixels, p.margins.box_depth) = (0.0, 0.0);
     };
-    let teeth: [(&str, Kind, Device, Proof); 9] = [
+    let teeth: [(&str, Kind, Device, Proof); 11] = [
         ("7/8 of a snap", Kind::Rectangle, REFERENCE, with(&most_of(1.0 / 512.0))),
         ("7/8 of a coarse snap", Kind::Rectangle, COARSE, with(&most_of(1.0 / 32.0))),
         ("no transform bound", Kind::Rectangle, REFERENCE, with(&no_transform)),
@@ -573,6 +608,8 @@ fn the_search_finds_what_each_margin_is_for() {
         ("no dilation", Kind::Hull, COARSE, with(&no_hull)),
         ("no transform bound", Kind::Hull, REFERENCE, with(&no_transform)),
         ("no depth", Kind::Hull, REFERENCE, with(&no_depth)),
+        ("no transform bound", Kind::Node, REFERENCE, with(&no_transform)),
+        ("no transform bound", Kind::Part, REFERENCE, with(&no_transform)),
         ("nothing", Kind::Box, REFERENCE, with(&bare_box)),
         ("no transform bound", Kind::Box, REFERENCE, with(&no_transform)),
     ];

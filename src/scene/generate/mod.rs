@@ -7,6 +7,7 @@ mod hard;
 mod model;
 mod plant_parts;
 mod powerplant;
+mod rim;
 mod rooms;
 mod shape;
 mod soup;

@@ -5,6 +5,7 @@
 //! `--scale` multiplies how many things stand about; nothing else depends on it.
 
 mod camera;
+mod edge;
 mod shapes;
 mod space;
 mod time;
@@ -52,6 +53,13 @@ pub const HARD: &[Generator] = &[
     camera::LAST_COLUMN,
     camera::STEREO,
     camera::SPLIT_SCREEN,
+    edge::POLES,
+    edge::SPARS,
+    edge::CROSSED_SPARS,
+    edge::WORLD_EDGE,
+    edge::ENDLESS_SIDES,
+    edge::PARALLEL_SHADOW,
+    edge::BETWEEN_FLOATS,
     shapes::FLAT,
     shapes::NEEDLES,
     shapes::SPECKS,
