@@ -7,10 +7,14 @@
 //! 2. **Hidden is hidden.** Nothing below a node of which an answer said "hidden" shows, drawn or not: what
 //!    was drawn before the question was no more than the frame has.
 //! 3. **Errors are passed up.** The error of a node of the index is no less than that of anything below it.
-//! 4. **Bounds hold what shows.** Of every node of which something shows, the rectangle and what would be
+//! 4. **Errors hold.** Clip coordinates of drawn positions, in f32 as renderers take them, are within the
+//!    object's bounds of those of exact arithmetic, axis by axis.
+//! 5. **Bounds hold what shows.** Of every node of which something shows, the rectangle and what would be
 //!    asked about cover the outermost samples and the nearest one, and are nowhere farther.
 //!
-//! Not every frame is held to the fourth, which costs a look at every sample. It must not know the checks.
+//! Not every frame is held to the last two: the fifth costs a look at every sample. It must not know the checks.
+
+use glam::DVec3;
 
 use super::{FrameState, Truth, World};
 use crate::cull::Item;
@@ -22,6 +26,8 @@ use crate::part::{ObjectId, PartId};
 
 /// One frame in so many is held to its bounds.
 const BOUNDS_ONE_IN: u32 = 2;
+/// Positions of a mesh that are held to the errors of their clip coordinates, about.
+const POSITIONS: usize = 8;
 /// Boxes by which parts are asked about in turn, from bound to bound.
 const BOXES: [usize; 3] = [1, 4, 16];
 
@@ -52,6 +58,7 @@ pub(super) fn audit(
     audit.hidden_is_hidden()?;
     audit.errors_are_passed_up()?;
     if looks_closely(state) {
+        audit.errors_hold(&state.matrices)?;
         audit.bounds_hold()?;
     }
     Ok(())
@@ -100,6 +107,11 @@ fn merged(into: &mut Option<Seen>, other: &Seen) {
         Some(seen) => seen.merge(other),
         None => *into = Some(*other),
     }
+}
+
+/// Whether an error is no less than another that it is to hold; one that is no number holds all.
+fn covers_error(has: f64, needs: f64) -> bool {
+    has >= needs || has.is_nan()
 }
 
 /// Whether a triangle of the fan from the first corner holds a place: what of a hull is drawn. Its corners are
@@ -269,14 +281,40 @@ impl<'a> Audit<'a> {
         let (scenery, index) = (self.scenery(), self.scenery().index());
         for &node in index.top_down().iter() {
             let has = scenery.node_error(node).bound;
-            let no_less = |needs: [f64; 4]| has.iter().zip(needs).all(|(has, n)| !(*has < n));
+            let no_less =
+                |needs: [f64; 4]| has.iter().zip(needs).all(|(has, n)| covers_error(*has, n));
             let objects = index.node(node).objects.iter();
             let own = objects.map(|object| self.view.objects[object.0 as usize].error.bound);
             let at_parent = index.parent(node).map(|parent| scenery.node_error(parent).bound);
-            let passed = at_parent
-                .is_none_or(|above| above.iter().zip(has).all(|(above, has)| !(*above < has)));
+            let passed = at_parent.is_none_or(|above| {
+                above.iter().zip(has).all(|(above, has)| covers_error(*above, has))
+            });
             if !(passed && own.into_iter().all(no_less)) {
                 return Err(format!("node {} has less error than what is in it", node.0));
+            }
+        }
+        Ok(())
+    }
+
+    fn errors_hold(&self, matrices: &[[f32; 16]]) -> Result<(), String> {
+        for (number, (seen, m)) in self.view.objects.iter().zip(matrices).enumerate() {
+            let positions = &self.world.partition.mesh(ObjectId(number as u32)).positions;
+            let apart = positions.len().div_ceil(POSITIONS).max(1);
+            for &[x, y, z] in positions.iter().step_by(apart) {
+                let exact =
+                    seen.clip_from_object * DVec3::from_array([x, y, z].map(f64::from)).extend(1.0);
+                for (axis, (exact, bound)) in
+                    exact.to_array().into_iter().zip(seen.error.bound).enumerate()
+                {
+                    let drawn = ((m[axis] * x + m[4 + axis] * y) + m[8 + axis] * z) + m[12 + axis];
+                    // What f64 rounds is in the bound too. A bound that is no number holds everything, and
+                    // what overflows is no coordinate.
+                    if drawn.is_finite() && (f64::from(drawn) - exact).abs() > bound {
+                        return Err(format!(
+                            "object {number}: clip coordinate {axis} of ({x}, {y}, {z}) is beyond its error"
+                        ));
+                    }
+                }
             }
         }
         Ok(())

@@ -238,7 +238,9 @@ impl Choice {
         let schedule = Schedule { seed, latency, doubt, misbehaviour };
         let device = match level(seed, axis::DEVICE, 10) {
             _ if !real.is_empty() => Device::Real(pick(seed, axis::DEVICE, real)),
-            _ if misbehaviour.is_some() => Device::Simulated(Source::Sim, schedule),
+            1 | 2 if misbehaviour.is_some() => Device::Simulated(Source::HierarchicalZ, schedule),
+            3 | 4 if misbehaviour.is_some() => Device::Simulated(Source::Tables, schedule),
+            0 if misbehaviour.is_some() => Device::Simulated(Source::Sim, schedule),
             0 => Device::Plain(Source::Sim),
             1 | 2 => Device::Plain(Source::HierarchicalZ),
             3 | 4 => Device::Plain(Source::Tables),
