@@ -8,7 +8,7 @@ use serde_json::json;
 use super::args::{RunArgs, quoted};
 use super::progress::progress_bar;
 use super::watchdog::{Hung, Watchdog};
-use super::{CliError, EXIT_FAILED, OutFile, Streams};
+use super::{CliError, EXIT_FAILED, EXIT_INTERRUPTED, EXIT_USAGE, OutFile, Streams};
 use crate::check::Ruling;
 use crate::cull::CullerKind;
 use crate::report::{JSON_SCHEMA, JunitCase, JunitEnd, Row, junit, table};
@@ -168,10 +168,17 @@ pub(super) fn run(
                 let mut kept = locked(&kept);
                 bar.suspend(|| tell_scene(args, &finished, &mut kept, &mut rows, streams))?;
             }
+            // Bad input leaves nothing behind.
+            Err(error) if error.exit() == EXIT_USAGE => {
+                bar.finish_and_clear();
+                return Err(error);
+            }
             Err(error) => {
-                let replay = run_line(args, &plan, named);
-                bar.suspend(|| writeln!(streams.talk, "replay: {replay}"))?;
-                locked(&kept).broken_off(named, &replay, &error);
+                if error.exit() != EXIT_INTERRUPTED {
+                    let replay = run_line(args, &plan, named);
+                    bar.suspend(|| writeln!(streams.talk, "replay: {replay}"))?;
+                    locked(&kept).broken_off(named, &replay, &error);
+                }
                 ended = Err(error);
                 break;
             }

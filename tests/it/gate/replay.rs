@@ -22,7 +22,7 @@ enum Flaw {
     OtherQuestion(bool),
     /// It panics in frame 1.
     Panics,
-    /// It draws nothing in frame 1.
+    /// It draws nothing from frame 1 on.
     DrawsNothing,
     /// It draws nothing in the second view of frame 1.
     SecondView,
@@ -44,7 +44,7 @@ impl Culler for Wrong {
             Flaw::OtherOrder(true) if view.frame == 2 => all.reverse(),
             Flaw::OtherQuestion(true) if view.frame == 2 => left = 1,
             Flaw::Panics if view.frame == 1 => panic!("a message\n  of two lines"),
-            Flaw::DrawsNothing if view.frame == 1 => all.clear(),
+            Flaw::DrawsNothing if view.frame > 0 => all.clear(),
             Flaw::SecondView if (view.frame, view.view) == (1, 1) => all.clear(),
             _ => {}
         }
