@@ -23,7 +23,7 @@ use crate::foreign::{Drawn, ForeignError, frame_line, header_line};
 use crate::part::PartId;
 use crate::report::{JunitCase, Row, Shown, junit, part_picture, picture_png, table, top_view};
 use crate::run::{
-    Cause, FrameRecord, FrameState, LaneInfo, Moment, Observer, RunError, Stop, Trace, Truth,
+    Cause, FrameRecord, FrameState, LaneInfo, Moment, Observer, RunError, Said, Stop, Trace, Truth,
     World, caught, partition_difference, render, told,
 };
 
@@ -191,7 +191,7 @@ fn gate(
     };
     let parts = world.partition.part_count();
     let mut watch = Watch { gate: Gate::forgiving(args.scene_args.late), worst: None };
-    let mut says = |state: &FrameState| -> Result<Result<Vec<PartId>, Cause>, CliError> {
+    let mut says = |state: &FrameState| -> Said<CliError> {
         if interrupted() {
             return Err(RunError::Interrupted.into());
         }

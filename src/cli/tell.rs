@@ -1,7 +1,7 @@
 //! What verbs say of lanes that did not hold, and the exit code that it comes to.
 
 use super::{CliError, EXIT_DEVICE, EXIT_FAILED, EXIT_HELD, Streams};
-use crate::check::{Gate, Ruling};
+use crate::check::{Check, Gate, Ruling};
 use crate::report::{JunitCase, JunitEnd, Row};
 use crate::run::{Moment, Trace};
 
@@ -87,9 +87,15 @@ pub(super) fn tell_failures(
     let lane = &trace.lane;
     writeln!(streams.talk, "{}", heading(gate, &lane.culler, lane.oracle))?;
     gate.failures().iter().try_for_each(|line| writeln!(streams.talk, "  {line}"))?;
-    // Where the device did not repeat or did not stay, no hash can be expected of it.
-    let own = gate.checks().iter().all(|check| check.ruling() == Ruling::Failed);
-    let expect = if own { format!(" --expect {:016x}", trace.hash()) } else { String::new() };
+    // Where a culler or device did not repeat or a device did not stay, no hash can be expected of it.
+    let repeats = |check: &Check| {
+        check.ruling() == Ruling::Failed && !matches!(check, Check::Determinism | Check::Hang)
+    };
+    let expect = if gate.checks().iter().all(repeats) {
+        format!(" --expect {:016x}", trace.hash())
+    } else {
+        String::new()
+    };
     writeln!(streams.talk, "  replay: {}{expect}", lane.replay)?;
     if let Some(miss) = gate.conservative.misses().first() {
         let Moment { frame, view } = miss.moment;

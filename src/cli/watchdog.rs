@@ -224,3 +224,22 @@ impl AtHang {
 fn locked(file: &Mutex<Option<WholeFile>>) -> MutexGuard<'_, Option<WholeFile>> {
     file.lock().unwrap_or_else(PoisonError::into_inner)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_is_no_limit() {
+        let limit = |text: &str| seconds(text).map(|frame_limit| FrameLimit { frame_limit });
+        assert_eq!(limit("0").unwrap().time(), None);
+        assert_eq!(limit("2.5").unwrap().time(), Some(Duration::from_millis(2500)));
+        for bad in ["-1", "nan", "inf", "1e30", "soon"] {
+            assert!(limit(bad).unwrap_err().contains("0 for no limit"), "{bad}");
+        }
+        let off = Watchdog::start(&limit("0").unwrap(), |_| {});
+        assert!(off.thread.is_none(), "nobody watches");
+        assert_eq!(FrameLimit::default().replay_flags(), "");
+        assert_eq!(limit("2.5").unwrap().replay_flags(), " --frame-limit 2.5");
+    }
+}

@@ -38,7 +38,7 @@ pub enum Canary {
     Lost,
     /// As `Set` in frame 0; then the device is lost in frame 1.
     SetThenLost,
-    /// Frame 1 never ends.
+    /// Frame 1 never ends, where the scene's seed is odd: so some worlds of a sweep end before.
     Hang,
 }
 
@@ -187,7 +187,7 @@ pub(super) fn strike(world: &World, moment: Moment) -> Result<(), OracleError> {
         Some(Canary::Lost | Canary::SetThenLost) => {
             Err(OracleError::Lost("a canary, on purpose".to_owned()))
         }
-        Some(Canary::Hang) => loop {
+        Some(Canary::Hang) if world.scene.seed % 2 == 1 => loop {
             std::thread::sleep(Duration::from_secs(1));
         },
         _ => Ok(()),

@@ -247,8 +247,8 @@ impl Running<'_, '_> {
             };
             let keeps_events = repeat.rounds > 0 && moment.frame < repeat.frames;
             let mut shared = Shared::default();
-            for place in 0..self.lanes.len() {
-                let Some(culler) = cullers[place].as_deref_mut() else { continue };
+            for (place, slot) in cullers.iter_mut().enumerate() {
+                let Some(culler) = slot.as_deref_mut() else { continue };
                 let (lane, pulse) = (&mut self.lanes[place], &self.pulse);
                 let done = attempt(|| {
                     let facts = truth_facts(&truth);
@@ -271,7 +271,7 @@ impl Running<'_, '_> {
                 match done {
                     Ok(trace) => self.traces[place].frames.push(trace),
                     Err(cause) => {
-                        cullers[place] = None;
+                        *slot = None;
                         self.stop(place, Some(moment), false, cause);
                     }
                 }
@@ -296,8 +296,8 @@ impl Running<'_, '_> {
             let mut cullers = self.cullers(true);
             for (shot, moment) in Moment::all(world, frames).enumerate() {
                 let state = FrameState::at(world, moment);
-                for place in 0..self.lanes.len() {
-                    let Some(culler) = cullers[place].as_deref_mut() else { continue };
+                for (place, slot) in cullers.iter_mut().enumerate() {
+                    let Some(culler) = slot.as_deref_mut() else { continue };
                     let (lane, pulse) = (&mut self.lanes[place], &self.pulse);
                     let first = &self.traces[place].frames[shot];
                     let done = attempt(|| {
@@ -315,7 +315,7 @@ impl Running<'_, '_> {
                     match done {
                         Ok(wall_ns) => walls[place][shot].push(wall_ns),
                         Err(cause) => {
-                            cullers[place] = None;
+                            *slot = None;
                             self.stop(place, Some(moment), true, cause);
                         }
                     }

@@ -25,7 +25,7 @@ pub use heartbeat::{Beat, oldest_beat};
 pub use lane::{Lane, LaneInfo, Observer, Repeat, RunError, run};
 pub use price::{Arithmetic, Rendering, StatePrice, price_states, render_approximately};
 pub use stop::{Cause, Stop, caught};
-pub use told::told;
+pub use told::{Said, told};
 pub use trace::{DeviceImages, FrameRecord, FrameTrace, Moment, Repetition, Trace};
 pub use truth::{
     Truth, depth_complexity, difference_to, fates_of_parts, partition_difference, render,

@@ -12,6 +12,9 @@ use super::{
 use crate::cull::{Counts, Situations};
 use crate::part::PartId;
 
+/// The parts that are told of a frame, or why there are none to come; or an error that ends the run.
+pub type Said<E> = Result<Result<Vec<PartId>, Cause>, E>;
+
 /// Has `observer` look at every view of frames `0..frames` with the parts that `says` of it; a part that is
 /// said twice counts once. Where `says` gives a cause in their place the lane ends there, and so it does
 /// where the truth or the observer panics: the observer is told.
@@ -22,7 +25,7 @@ pub fn told<E>(
     world: &World,
     frames: u32,
     info: &LaneInfo,
-    says: &mut dyn FnMut(&FrameState) -> Result<Result<Vec<PartId>, Cause>, E>,
+    says: &mut dyn FnMut(&FrameState) -> Said<E>,
     observer: &mut dyn Observer,
 ) -> Result<Trace, E> {
     let mut trace = Trace { lane: info.clone(), frames: Vec::new(), stop: None };

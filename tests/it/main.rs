@@ -13,6 +13,7 @@ mod determinism;
 mod effects;
 mod faults;
 mod foreign;
+mod gate;
 mod golden;
 mod hard;
 mod held;

@@ -12,8 +12,8 @@ for (const section of document.querySelectorAll("section.scene")) {
     said.textContent = "frame " + frame + (data.views > 1 ? ", view " + view : "");
     slider.setAttribute("aria-valuetext", said.textContent);
     for (const row of rows) {
-      const figures = data.lanes[Number(row.dataset.lane)].frames[shot];
-      [...row.querySelectorAll("td[data-figure]")].forEach((cell, i) => { cell.textContent = figures[i]; });
+      const figures = data.lanes[Number(row.dataset.lane)].frames[shot] ?? []; // a lane that ended early has none
+      [...row.querySelectorAll("td[data-figure]")].forEach((cell, i) => { cell.textContent = figures[i] ?? ""; });
     }
     for (const image of pictures) {
       const png = data.pictures[shot] && data.pictures[shot][image.dataset.layer];
