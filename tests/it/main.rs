@@ -18,6 +18,7 @@ mod hard;
 mod held;
 mod index;
 mod lavapipe;
+mod limits;
 mod margins;
 mod memory;
 mod oracle;
