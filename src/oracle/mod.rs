@@ -12,6 +12,7 @@ mod always;
 mod approximate;
 mod batches;
 mod cost;
+mod device_limits;
 mod fit;
 pub mod hierarchical_z;
 mod maxima;
@@ -36,6 +37,7 @@ use crate::scene::{DepthOrder, Viewport};
 pub use always::Always;
 pub use approximate::{Approximate, BufferKnobs, DepthFormat};
 pub use cost::{Amounts, CostModel};
+pub use device_limits::DeviceLimits;
 pub use fit::{FitError, Measurement};
 pub use hierarchical_z::HierarchicalZ;
 #[cfg(feature = "hardware")]

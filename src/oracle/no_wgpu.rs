@@ -3,11 +3,17 @@
 
 use std::sync::Arc;
 
-use super::{Answer, FrameView, Oracle, OracleError, Proxy, QueryId, Questions, ReadBack, Stage};
+use super::{
+    Answer, DeviceLimits, FrameView, Oracle, OracleError, Proxy, QueryId, Questions, ReadBack,
+    Stage,
+};
 use crate::part::PartId;
 
 /// Said where a device is listed or required.
 pub const NO_DEVICE: &str = "none: built without the feature `hardware`";
+
+/// Queries in one pass of a device that cannot be.
+pub const QUERIES_PER_PASS: usize = 128;
 
 /// A device that cannot be.
 #[derive(Debug)]
@@ -54,6 +60,24 @@ impl Hardware {
     /// None.
     pub fn new(stage: &Arc<GpuStage>, _: Questions) -> Result<Self, OracleError> {
         match **stage {}
+    }
+
+    /// Never called, for want of a [`GpuStage`].
+    ///
+    /// # Errors
+    /// None.
+    pub fn with_limits(
+        stage: &Arc<GpuStage>,
+        _: Questions,
+        _: DeviceLimits,
+    ) -> Result<Self, OracleError> {
+        match **stage {}
+    }
+
+    /// Submissions so far.
+    #[must_use]
+    pub fn submissions(&self) -> u64 {
+        match *self {}
     }
 }
 

@@ -19,6 +19,7 @@ mod hard;
 mod held;
 mod index;
 mod lavapipe;
+mod limits;
 mod margins;
 mod memory;
 mod oracle;

@@ -8,8 +8,8 @@ use plainsight::cull::{CULLERS, CullerKind, ProxyKind};
 use plainsight::index::INDEXES;
 use plainsight::oracle::wgpu::{GpuStage, Hardware};
 use plainsight::oracle::{
-    FrameView, Memory, MemoryKnobs, Oracle, OracleError, Proxy, Questions, Residency, Sim, Stage,
-    Step, least_budget, mesh_bytes,
+    DeviceLimits, FrameView, Memory, MemoryKnobs, Oracle, OracleError, Proxy, Questions, Residency,
+    Sim, Stage, Step, least_budget, mesh_bytes,
 };
 use plainsight::part::{PartId, Partition, PartitionKnobs};
 use plainsight::run::{FrameTrace, Trace, World};
@@ -305,10 +305,13 @@ fn an_eviction_in_the_middle_of_a_batch_moves_no_answer() {
     let stage = Stage { memory: Some(knobs), ..Stage::new(partition, viewport) };
     let device = GpuStage::new(gpu(), &stage).unwrap();
     let on_device = |questions| Box::new(Hardware::new(&device, questions).unwrap());
+    let tiny = DeviceLimits { queries_per_pass: 1, scene_bytes: Some(0) };
     let oracles: Vec<Box<dyn Oracle>> = vec![
         Box::new(Sim::new(stage)),
         on_device(Questions::Queries),
         on_device(Questions::Pyramid),
+        // Cut before every question too.
+        Box::new(Hardware::with_limits(&device, Questions::Queries, tiny).unwrap()),
     ];
     let places = [at(-0.9), at(0.0), at(0.7)];
     let everywhere = Proxy::Rectangle { min: [0, 0], max: [64, 48], depth: 0.5_f32.next_up() };

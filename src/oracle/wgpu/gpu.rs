@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use plainsight_reference::Tolerance;
 
+use super::scene_size::SCENE_BYTES;
 use super::stage::Drawing;
 use crate::oracle::OracleError;
 use crate::scene::DepthOrder;
@@ -18,6 +19,7 @@ pub struct Gpu {
     pub(super) queue: wgpu::Queue,
     name: String,
     tolerance: Tolerance,
+    scene_bytes: Option<u64>,
     /// Pipelines for forward and for reversed depth, made when a scene first needs them.
     drawing: [OnceLock<Arc<Drawing>>; 2],
     /// The first thing the device complained about.
@@ -44,18 +46,27 @@ const H100: Tolerance = Tolerance { pixels: 1.0 / 1024.0, ulps: 4, clipped_ulps:
 /// What any Vulkan device may do at least; depth planes of its own making. To be measured for each.
 const UNKNOWN: Tolerance = Tolerance { pixels: FOUR_BITS, ulps: 4096, clipped_ulps: 65_536 };
 
-/// Drivers whose tolerance was measured, by a part of the adapter's name; the first that is there is the
-/// default device.
-const MEASURED: [(&str, Tolerance); 3] =
-    [("llvmpipe", LAVAPIPE), ("swiftshader", SWIFTSHADER), ("nvidia h100", H100)];
-
-fn measured(adapter: &wgpu::Adapter, name: &str) -> bool {
-    adapter.get_info().name.to_lowercase().contains(name)
+/// A driver that was measured.
+struct Driver {
+    /// A part of the adapter's name, in lower case.
+    name: &'static str,
+    tolerance: Tolerance,
+    /// Most bytes of a submission with questions; `None` where a driver answers rightly whatever it is sent.
+    scene_bytes: Option<u64>,
 }
 
-fn tolerance(adapter: &wgpu::Adapter) -> Tolerance {
-    let known = MEASURED.into_iter().find(|(name, _)| measured(adapter, name));
-    known.map_or(UNKNOWN, |(_, tolerance)| tolerance)
+/// Drivers that were measured; the first that is there is the default device.
+const MEASURED: [Driver; 3] = [
+    Driver { name: "llvmpipe", tolerance: LAVAPIPE, scene_bytes: Some(SCENE_BYTES) },
+    Driver { name: "swiftshader", tolerance: SWIFTSHADER, scene_bytes: None },
+    Driver { name: "nvidia h100", tolerance: H100, scene_bytes: None },
+];
+
+impl Driver {
+    /// Whether it drives an adapter.
+    fn drives(&self, adapter: &wgpu::Adapter) -> bool {
+        adapter.get_info().name.to_lowercase().contains(self.name)
+    }
 }
 
 fn all_adapters() -> Vec<wgpu::Adapter> {
@@ -95,7 +106,7 @@ impl Gpu {
             // The loader's order is no one's promise.
             None => MEASURED
                 .iter()
-                .find_map(|(name, _)| found.iter().find(|a| measured(a, name)))
+                .find_map(|driver| found.iter().find(|a| driver.drives(a)))
                 .or(found.iter().find(is_cpu))
                 .or(found.first()),
         };
@@ -131,9 +142,11 @@ impl Gpu {
                 note(&lost, format!("{reason:?}: {message}"));
             }
         });
-        let (name, tolerance) = (describe(chosen), tolerance(chosen));
-        let drawing = [OnceLock::new(), OnceLock::new()];
-        Ok(Arc::new(Self { device, queue, name, tolerance, drawing, trouble }))
+        let driver = MEASURED.iter().find(|driver| driver.drives(chosen));
+        let tolerance = driver.map_or(UNKNOWN, |driver| driver.tolerance);
+        let scene_bytes = driver.and_then(|driver| driver.scene_bytes);
+        let (name, drawing) = (describe(chosen), [OnceLock::new(), OnceLock::new()]);
+        Ok(Arc::new(Self { device, queue, name, tolerance, scene_bytes, drawing, trouble }))
     }
 
     /// What drawing takes on this device.
@@ -152,6 +165,11 @@ impl Gpu {
     #[must_use]
     pub fn tolerance(&self) -> Tolerance {
         self.tolerance
+    }
+
+    /// Most bytes of a submission with questions, where the driver has such a limit.
+    pub(super) fn scene_bytes(&self) -> Option<u64> {
+        self.scene_bytes
     }
 
     /// Whether the device has complained of anything so far.

@@ -9,11 +9,13 @@ use super::images::Images;
 use super::pyramid::{Ask, Pyramid};
 use super::read_back::{DepthReader, MOST_COPIES};
 use super::redraw::encode_redraw;
-use super::slot::{Need, QUERIES_PER_PASS, RESULT_BYTES, Slot};
+use super::scene_size::{Binned, Filling, Reach, question_bytes};
+use super::slot::{Need, RESULT_BYTES, Slot};
 use super::stage::{DrawnObject, GpuParts, GpuStage};
 use crate::oracle::{
-    Answer, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, Questions, ReadBack, Residency,
-    Step, box_proxy_triangles, hull_proxy_triangles, rectangle_triangles,
+    Answer, DeviceLimits, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, Questions,
+    ReadBack, Residency, Stage, Step, box_proxy_triangles, hull_proxy_triangles,
+    rectangle_triangles,
 };
 use crate::part::{ObjectId, PartId};
 
@@ -78,6 +80,10 @@ pub struct Hardware {
     unasked: Vec<u32>,
     flights: VecDeque<Flight>,
     free: Vec<Slot>,
+    queries_per_pass: usize,
+    /// What the next submission holds so far, where the device's questions need that to be little.
+    filling: Option<Filling>,
+    submissions: u64,
     limited: Option<Limited>,
     /// What went wrong while drawing, told by the next submit. Until then nothing more is drawn: the
     /// books no longer say what is on the device.
@@ -85,7 +91,7 @@ pub struct Hardware {
 }
 
 impl Hardware {
-    /// An oracle with targets of its own over shared geometry.
+    /// An oracle with targets of its own over shared geometry, and the limits of its driver.
     ///
     /// # Errors
     /// [`OracleError::Lost`] where the device refuses.
@@ -93,6 +99,26 @@ impl Hardware {
     /// # Panics
     /// Where the stage has not enough memory for its largest mesh.
     pub fn new(stage: &Arc<GpuStage>, questions: Questions) -> Result<Self, OracleError> {
+        Self::with_limits(stage, questions, DeviceLimits::default())
+    }
+
+    /// An oracle like [`Hardware::new`]'s that sends no more at once than `limits` say. Answers do not depend
+    /// on them. Only query objects are limited: [`Questions::Pyramid`] and [`Questions::ReadBack`] have none.
+    ///
+    /// # Errors
+    /// [`OracleError::Lost`] where the device refuses.
+    ///
+    /// # Panics
+    /// Where the stage has not enough memory for its largest mesh.
+    pub fn with_limits(
+        stage: &Arc<GpuStage>,
+        questions: Questions,
+        limits: DeviceLimits,
+    ) -> Result<Self, OracleError> {
+        let scene_bytes = limits.scene_bytes.or(stage.gpu.scene_bytes());
+        let filling = scene_bytes
+            .filter(|_| questions == Questions::Queries)
+            .map(|bytes| Filling::new(bytes, stage.stage.viewport));
         let images = Images::new(stage, false);
         let pyramid = (questions == Questions::Pyramid)
             .then(|| Pyramid::new(&stage.gpu, stage.stage.viewport));
@@ -121,22 +147,35 @@ impl Hardware {
             unasked: Vec::new(),
             flights: VecDeque::new(),
             free: Vec::new(),
+            queries_per_pass: limits.queries_per_pass.clamp(1, DeviceLimits::MOST_QUERIES),
+            filling,
+            submissions: 0,
             limited,
             failed: None,
         })
+    }
+
+    /// Submissions to the device so far, but for images that were read back.
+    #[must_use]
+    pub fn submissions(&self) -> u64 {
+        self.submissions
     }
 
     fn encoder(&self) -> wgpu::CommandEncoder {
         self.stage.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
+    /// A matrix to clip space whose depth runs as the device's does, from 0 to w.
+    fn on_device(&self, matrix: &[f32; 16]) -> [f32; 16] {
+        let (mut turned, order) = (*matrix, self.stage.stage.depth);
+        turned.iter_mut().skip(2).step_by(4).for_each(|z| *z = order.on_device(*z));
+        turned
+    }
+
     /// What the shader is told of an object.
     fn drawn_object(&self, object: ObjectId) -> DrawnObject {
-        let order = self.stage.stage.depth;
-        let mut clip_from_object = self.matrices[object.0 as usize];
-        clip_from_object.iter_mut().skip(2).step_by(4).for_each(|z| *z = order.on_device(*z));
         DrawnObject {
-            clip_from_object,
+            clip_from_object: self.on_device(&self.matrices[object.0 as usize]),
             first_part: self.stage.stage.partition.first_part(object).0,
             padding: [0; 3],
         }
@@ -165,13 +204,63 @@ impl Hardware {
         Ok(())
     }
 
-    /// Sees to it that a mesh can be drawn at this point of the stream.
-    fn before_draw(&mut self, mesh: u32) -> Result<(), OracleError> {
+    /// Sees to it that a part can be drawn at this point of the stream.
+    fn before_draw(&mut self, part: PartId) -> Result<(), OracleError> {
         // Questions so far are about the depth before this draw.
         if self.questions == Questions::ReadBack && !self.open.is_empty() {
             self.flush(true)?;
         }
-        self.need(mesh)
+        let partition = &self.stage.stage.partition;
+        let mesh = partition.mesh_index(partition.locate(part).0);
+        self.need(mesh)?;
+        self.make_room(Binned::Draw, |this| this.draw_bytes(part))
+    }
+
+    /// Bytes of a draw in the device's scene, by an upper estimate.
+    fn draw_bytes(&self, part: PartId) -> u64 {
+        let Stage { partition, viewport, .. } = &self.stage.stage;
+        let (object, local) = partition.locate(part);
+        let clip = self.on_device(&self.matrices[object.0 as usize]);
+        let shape = &self.stage.shapes()[partition.mesh_index(object) as usize][local as usize];
+        let bounds = &partition.mesh(object).parts[local as usize].bounds;
+        shape.draw_bytes(bounds, &clip, *viewport)
+    }
+
+    /// Bytes of a question in the device's scene, by an upper estimate.
+    fn question_bytes(&self, proxies: &[Proxy]) -> u64 {
+        let viewport = self.stage.stage.viewport;
+        let reach = |proxy: &Proxy| match *proxy {
+            Proxy::Rectangle { min, max, .. } => (Reach::within(min, max, viewport), 2),
+            Proxy::Hull { hull, min, max, .. } => {
+                (Reach::within(min, max, viewport), hull.corners().len() as u64)
+            }
+            Proxy::Box { clip_from_box, min, max } => {
+                let clip = self.on_device(&clip_from_box);
+                let [min, max] = [min, max].map(|corner| corner.map(f64::from));
+                (Reach::of_box(&clip, min, max, viewport), 12)
+            }
+        };
+        question_bytes(proxies.iter().map(reach), viewport)
+    }
+
+    /// Sends what is there where it would be too much together with an event of so many bytes, which is to
+    /// follow.
+    fn make_room(
+        &mut self,
+        event: Binned,
+        bytes: impl Fn(&Self) -> u64,
+    ) -> Result<(), OracleError> {
+        if self.filling.is_none() {
+            return Ok(());
+        }
+        let bytes = bytes(self);
+        if self.filling.as_ref().is_some_and(|filling| filling.is_full_for(event, bytes)) {
+            self.flush(true)?;
+        }
+        if let Some(filling) = &mut self.filling {
+            filling.add(event, bytes);
+        }
+        Ok(())
     }
 
     /// Throws meshes out and loads others. What is still to be drawn with the former is drawn first,
@@ -279,9 +368,9 @@ impl Hardware {
             }
             let clear = !std::mem::replace(&mut self.cleared, true);
             // Draws after the last question of a full set go with the next pass, which may have none.
-            let with = slot
-                .as_ref()
-                .filter(|_| self.pyramid.is_none() && set * QUERIES_PER_PASS < self.open.len());
+            let with = slot.as_ref().filter(|_| {
+                self.pyramid.is_none() && set * self.queries_per_pass < self.open.len()
+            });
             place = self.encode_pass(&mut encoder, with.map(|slot| (slot, set)), place, clear);
             set += 1;
         }
@@ -293,6 +382,10 @@ impl Hardware {
             (copy, std::mem::take(&mut self.asks))
         });
         let submission = self.stage.gpu.queue.submit([encoder.finish()]);
+        self.submissions += 1;
+        if let Some(filling) = &mut self.filling {
+            filling.clear();
+        }
         let queries = std::mem::take(&mut self.open);
         if let Some((copy, _)) = &depth {
             copy.slice(..).map_async(wgpu::MapMode::Read, |_| {});
@@ -399,9 +492,10 @@ impl Hardware {
     fn encode_results(&self, encoder: &mut wgpu::CommandEncoder, slot: &Slot) {
         let bytes = self.open.len() as u64 * RESULT_BYTES;
         if self.pyramid.is_none() {
-            for set in 0..self.open.len().div_ceil(QUERIES_PER_PASS) {
-                let count = (self.open.len() - set * QUERIES_PER_PASS).min(QUERIES_PER_PASS);
-                let offset = (set * QUERIES_PER_PASS) as u64 * RESULT_BYTES;
+            let per_pass = self.queries_per_pass;
+            for set in 0..self.open.len().div_ceil(per_pass) {
+                let count = (self.open.len() - set * per_pass).min(per_pass);
+                let offset = (set * per_pass) as u64 * RESULT_BYTES;
                 let run = 0..count as u32;
                 encoder.resolve_query_set(&slot.queries[set], run, &slot.resolved, offset);
             }
@@ -414,12 +508,12 @@ impl Hardware {
         let vertices = size_of_val(self.proxy_vertices.as_slice()) as u64;
         let proxies = vertices.max(size_of_val(self.asks.as_slice()) as u64);
         let with_objects = self.questions == Questions::Queries;
-        let need = Need { questions: self.open.len(), proxies, with_objects };
+        let per_pass = self.queries_per_pass;
+        let need = Need { questions: self.open.len(), proxies, with_objects, per_pass };
         Slot::with_room(&self.stage.gpu.device, self.free.pop(), need)
     }
 
-    /// Encodes the batch's events from `from` on as one pass of at most [`QUERIES_PER_PASS`]
-    /// questions; returns where it stopped.
+    /// Encodes the batch's events from `from` on as one pass of no more questions than a pass may have; returns where it stopped.
     fn encode_pass(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -457,7 +551,7 @@ impl Hardware {
                 Event::AskPyramid { .. } => return place,
                 Event::Ask { first_vertex, end_vertex } => {
                     let Some((slot, _)) = slot else { continue };
-                    if queries == QUERIES_PER_PASS {
+                    if queries == self.queries_per_pass {
                         return place;
                     }
                     drawing = None;
@@ -509,6 +603,9 @@ impl Oracle for Hardware {
         self.matrices.extend_from_slice(view.clip_from_object);
         self.cleared = false;
         self.asked = 0;
+        if let Some(filling) = &mut self.filling {
+            filling.clear();
+        }
         self.events.clear();
         self.open.clear();
         self.proxy_vertices.clear();
@@ -521,9 +618,7 @@ impl Oracle for Hardware {
         if self.failed.is_some() {
             return;
         }
-        let partition = &self.stage.stage.partition;
-        let mesh = partition.mesh_index(partition.locate(part).0);
-        if let Err(error) = self.before_draw(mesh) {
+        if let Err(error) = self.before_draw(part) {
             // Nothing is encoded for a mesh that could not be loaded.
             self.failed.get_or_insert(error);
             return;
@@ -534,6 +629,12 @@ impl Oracle for Hardware {
     fn ask(&mut self, proxies: &[Proxy]) -> QueryId {
         if self.questions != Questions::Queries {
             return self.ask_rectangles(proxies);
+        }
+        if self.failed.is_none()
+            && let Err(error) =
+                self.make_room(Binned::Question, |this| this.question_bytes(proxies))
+        {
+            self.failed = Some(error);
         }
         let (first_vertex, order) = (self.proxy_vertices.len(), self.stage.stage.depth);
         let viewport = self.stage.stage.viewport;
@@ -565,7 +666,7 @@ impl Oracle for Hardware {
     }
 
     fn collect(&mut self, answers: &mut Vec<Answer>) -> Result<(), OracleError> {
-        // What an eviction sent ahead of the batch's end is handed over with the end.
+        // What was sent ahead of the batch's end is handed over with the end.
         let Some(last) = self.flights.iter().position(|flight| !flight.more) else {
             return Ok(());
         };

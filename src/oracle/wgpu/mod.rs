@@ -11,6 +11,7 @@ mod images;
 mod pyramid;
 mod read_back;
 mod redraw;
+mod scene_size;
 mod slot;
 mod stage;
 

@@ -14,6 +14,8 @@ pub(super) struct Need {
     pub(super) proxies: u64,
     /// Whether query objects answer.
     pub(super) with_objects: bool,
+    /// Query objects of one set, which a pass takes.
+    pub(super) per_pass: usize,
 }
 
 /// What a batch needs on the device, kept for the next one.
@@ -52,8 +54,8 @@ impl Slot {
 
     /// `slot`, or a new one, with room for what a batch needs.
     pub(super) fn with_room(device: &wgpu::Device, slot: Option<Self>, need: Need) -> Self {
-        let sets = need.questions.div_ceil(QUERIES_PER_PASS);
-        let bytes = (sets * QUERIES_PER_PASS) as u64 * RESULT_BYTES;
+        let sets = need.questions.div_ceil(need.per_pass);
+        let bytes = (sets * need.per_pass) as u64 * RESULT_BYTES;
         let mut slot = slot.unwrap_or_else(|| Self::new(device, bytes, need.proxies));
         if slot.resolved.size() < bytes || slot.proxies.size() < need.proxies {
             let (bytes, proxies) =
@@ -64,7 +66,7 @@ impl Slot {
             slot.queries.push(device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: None,
                 ty: wgpu::QueryType::Occlusion,
-                count: QUERIES_PER_PASS as u32,
+                count: need.per_pass as u32,
             }));
         }
         slot

@@ -1,12 +1,13 @@
 //! What stays on the device for a whole run: geometry and pipelines, shared by all oracles of a
 //! scene.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use wgpu::util::DeviceExt;
 
 use super::gpu::Gpu;
 use super::pyramid;
+use super::scene_size::Shape;
 use crate::oracle::{OracleError, Stage};
 use crate::part::PartedMesh;
 use crate::scene::DepthOrder;
@@ -106,9 +107,20 @@ pub struct GpuStage {
     pub(super) stage: Stage,
     pub(super) meshes: Vec<GpuMesh>,
     pub(super) drawing: Arc<Drawing>,
+    shapes: OnceLock<Vec<Vec<Shape>>>,
 }
 
 impl GpuStage {
+    /// Shapes of the parts of each mesh, made when first needed.
+    pub(super) fn shapes(&self) -> &[Vec<Shape>] {
+        self.shapes.get_or_init(|| {
+            let of = |mesh: &Arc<PartedMesh>| {
+                mesh.parts.iter().map(|part| Shape::of(mesh, part)).collect()
+            };
+            self.stage.partition.meshes().iter().map(of).collect()
+        })
+    }
+
     /// What the depth target is cleared to.
     pub(super) fn clear_depth(&self) -> f32 {
         let [_, far] = self.stage.depth.range();
@@ -134,6 +146,7 @@ impl GpuStage {
             stage: stage.clone(),
             meshes,
             drawing: gpu.drawing(stage.depth),
+            shapes: OnceLock::new(),
         });
         gpu.wait(None)?;
         Ok(made)
