@@ -224,7 +224,7 @@ fn before(mut gate: Gate, canary: Option<Canary>) -> (Gate, Trace) {
         })
     };
     let (culler, observer) = (Box::new(make), &mut gate);
-    let lane = Lane { info, culler, oracle, observer, with_bound: false };
+    let lane = Lane { info, culler, oracle, observer, with_bound: false, audited: false };
     let mut traces = run_lanes(&world, 2, Repeat::first(1), &mut [lane], &mut || true).unwrap();
     (gate, traces.pop().unwrap())
 }
