@@ -104,6 +104,9 @@ pub(super) fn judge(
         Err(CliError::Panicked { place: format!("replay: {}", outputs.again()), said })
     });
     let Some(file) = junit_file else { return code };
+    if matches!(&code, Err(error) if error.is_bad_input()) {
+        return code;
+    }
     if let Err(error) = &code {
         cases.push(error_case(&args.scene, "judge", error, outputs.again()));
     }

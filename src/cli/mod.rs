@@ -81,6 +81,9 @@ enum CliError {
     Run(#[from] RunError),
     #[error("{0}")]
     Usage(String),
+    /// An output that cannot be written, or must not be.
+    #[error("{0}")]
+    Output(String),
     #[error("{0}; choose another --cache")]
     Cache(#[from] CacheError),
     #[error("panic: {place}: {said}")]
@@ -96,6 +99,11 @@ impl From<OracleError> for CliError {
 }
 
 impl CliError {
+    /// Whether what the user gave was wrong: such a run leaves nothing behind.
+    fn is_bad_input(&self) -> bool {
+        matches!(self, Self::Usage(_) | Self::Scene(_))
+    }
+
     fn exit(&self) -> u8 {
         match self {
             Self::Run(RunError::Interrupted) => signals::exit_interrupted(),

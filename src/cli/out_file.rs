@@ -123,7 +123,7 @@ impl<'a> Outputs<'a> {
     /// One line, where it cannot be written, or must not be.
     pub(super) fn file(&mut self, flag: &str, path: &Path) -> Result<OutFile<'a>, CliError> {
         let label = format!("{flag} {}", quoted(&path.display().to_string()));
-        let refuse = |what: String| CliError::Usage(format!("{label}: {what}"));
+        let refuse = |what: String| CliError::Output(format!("{label}: {what}"));
         if is_stream(path) {
             let stream = self.stream.take();
             let stream = stream.ok_or_else(|| refuse("standard output is taken".to_owned()))?;
@@ -155,7 +155,7 @@ impl<'a> Outputs<'a> {
     /// One line, where there can be no such folder.
     pub(super) fn folder(&self, flag: &'static str, path: &Path) -> Result<OutFolder, CliError> {
         let label = format!("{flag} {}", quoted(&path.display().to_string()));
-        let refuse = |what: String| CliError::Usage(format!("{label}: {what}"));
+        let refuse = |what: String| CliError::Output(format!("{label}: {what}"));
         if path.as_os_str().is_empty() || is_stream(path) {
             return Err(refuse("several files are written; name a folder".to_owned()));
         }
@@ -279,7 +279,7 @@ impl WholeFile {
 }
 
 fn unwritten(label: &str, what: &str) -> CliError {
-    CliError::Usage(format!("{label}: could not be written: {what}"))
+    CliError::Output(format!("{label}: could not be written: {what}"))
 }
 
 /// Writes beside the target of `path` and renames.

@@ -89,6 +89,9 @@ pub(super) fn run(
             .unwrap_or_else(|said| {
                 Err(CliError::Panicked { place: format!("replay: {}", outputs.again()), said })
             });
+    if matches!(&code, Err(error) if error.is_bad_input()) {
+        return code;
+    }
     let mut cases = locked(&told.cases);
     if let Err(error) = &code {
         cases.push(error_case("plainsight", "run", error, outputs.again()));
@@ -161,7 +164,7 @@ fn run_scenes(
         out.finish(&[])?;
     }
     let Err((scene, error)) = ended else { return Ok(exit_of(told.ruling)) };
-    if let Some(scene) = scene {
+    if let Some(scene) = scene.filter(|_| !error.is_bad_input()) {
         let replay = run_line(args, &plan, scene);
         writeln!(streams.talk, "replay: {replay}")?;
         locked(&told.cases).push(error_case(scene.name(), "all lanes", &error, &replay));

@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn a_swing_uses_its_bound() {
         for (pace, swings, least) in
-            [(0.3, [0.8, 0.0], 0.8), (2.9, [0.7, 0.0], 0.8), (1.4, [0.0, 1.0], 0.6)]
+            [(0.3, [0.8, 0.0], 0.6), (2.9, [0.7, 0.0], 0.6), (1.4, [0.0, 1.0], 0.6)]
         {
             let effect = figure(pace, swings);
             let limb = effect.limb(0).unwrap();

@@ -37,7 +37,7 @@ use crate::scene::{DepthOrder, Viewport};
 pub use always::Always;
 pub use approximate::{Approximate, BufferKnobs, DepthFormat};
 pub use cost::{Amounts, CostModel};
-pub use device_limits::DeviceLimits;
+pub use device_limits::{DeviceLimits, QUERIES_PER_PASS};
 pub use fit::{FitError, Measurement};
 pub use hierarchical_z::HierarchicalZ;
 #[cfg(feature = "hardware")]

@@ -12,9 +12,6 @@ use crate::part::PartId;
 /// Said where a device is listed or required.
 pub const NO_DEVICE: &str = "none: built without the feature `hardware`";
 
-/// Queries in one pass of a device that cannot be.
-pub const QUERIES_PER_PASS: usize = 128;
-
 /// A device that cannot be.
 #[derive(Debug)]
 pub enum Gpu {}

@@ -224,7 +224,9 @@ impl World {
         };
         let step = self.effects.step_bound(object, middle);
         let slack = (reach + middle + step + self.effects.extent(object)) * BOUND_SLACK;
-        let step_bound = if step > 0.0 { step + slack } else { 0.0 };
+        // What turns in place has a middle that moves by rounding alone.
+        let moves = step > 0.0 || self.effects.turns(object);
+        let step_bound = if moves { step + slack } else { 0.0 };
         Entry { bounds, step_bound, reach: reach + slack }
     }
 }

@@ -3,9 +3,10 @@
 
 use std::sync::Arc;
 
-use plainsight::oracle::wgpu::{GpuStage, Hardware, QUERIES_PER_PASS};
+use plainsight::oracle::wgpu::{GpuStage, Hardware};
 use plainsight::oracle::{
-    Answer, DeviceLimits, FrameView, Oracle, Proxy, Questions, ReadBack, Sim, Stage,
+    Answer, DeviceLimits, FrameView, Oracle, Proxy, QUERIES_PER_PASS, Questions, ReadBack, Sim,
+    Stage,
 };
 use plainsight::part::{PartId, Partition, PartitionKnobs};
 use plainsight::run::FrameState;
@@ -130,10 +131,13 @@ fn asked(oracle: &mut dyn Oracle, world: &plainsight::run::World) -> (Vec<Answer
     let Viewport { width, height } = world.scene.viewport;
     let parts = world.partition.part_count();
     let mut answers = Vec::new();
+    // Something stands before most of the background from the start.
+    (0..parts).step_by(2).for_each(|part| oracle.draw_part(PartId(part)));
     for event in 0..400 {
         let mut span = |side: u32| {
             let first = stream.below(side);
-            (first, first + 1 + stream.below(side - first))
+            // Small: a large one shows somewhere.
+            (first, first + 1 + stream.below((side - first).min(6)))
         };
         let (x, y) = (span(width), span(height));
         let depth = (1.0 - stream.unit() * stream.unit() * 0.05) as f32;

@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
 use plainsight::math::{Aabb, ClipBox, ClipError, Outline, Projection};
-use plainsight::oracle::wgpu::{GpuStage, Hardware, QUERIES_PER_PASS};
-use plainsight::oracle::{Answer, FrameView, Oracle, Proxy, Questions, Sim, Stage};
+use plainsight::oracle::wgpu::{GpuStage, Hardware};
+use plainsight::oracle::{
+    Answer, FrameView, Oracle, Proxy, QUERIES_PER_PASS, Questions, Sim, Stage,
+};
 use plainsight::part::{PartId, Partition, PartitionKnobs};
 use plainsight::scene::generate::{Knobs, build};
 use plainsight::scene::{DepthOrder, Effects, Mesh, Object, Placement, Stream, Viewport};

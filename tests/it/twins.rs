@@ -7,7 +7,7 @@ use plainsight::cull::{Appearance, CullerSetup, Item, ProxyKind, Scenery, Scener
 use plainsight::index::{INDEXES, Index, NodeId};
 use plainsight::math::{
     Aabb, BOX_DEPTH_SLACK, BOX_DILATION_PIXELS, ClipBox, ClipError, DEPTH_ROUNDING,
-    HULL_DILATION_PIXELS, Outline, PixelRectangle, Projection, RECTANGLE_DILATION_PIXELS,
+    HULL_DILATION_PIXELS, Hull, Outline, PixelRectangle, Projection, RECTANGLE_DILATION_PIXELS,
     inflated_box,
 };
 use plainsight::oracle::{CostModel, Proxy};
@@ -255,6 +255,20 @@ fn projections_are_those_of_the_derivation() {
     );
 }
 
+/// Whether a sample is in the fan of triangles that a hull is drawn as. [`Hull::holds`] asks the line through each
+/// side, which says less where rounding has bent a short one inwards.
+fn is_drawn(hull: &Hull, [x, y]: [i32; 2]) -> bool {
+    let left_of = |a: &[i32; 2], b: &[i32; 2]| {
+        let wide = |from: i32, to: i32| i64::from(to) - i64::from(from);
+        wide(a[0], b[0]) * wide(a[1], y) >= wide(a[1], b[1]) * wide(a[0], x)
+    };
+    let corners = hull.corners();
+    let first = &corners[0];
+    corners[1..].windows(2).any(|pair| {
+        left_of(first, &pair[0]) && left_of(&pair[0], &pair[1]) && left_of(&pair[1], first)
+    })
+}
+
 /// A hull holds every corner's surroundings, as far as its bound and the dilation reach on each axis, and
 /// where nothing cuts it, hardly more.
 #[test]
@@ -287,7 +301,7 @@ fn hulls_reach_as_far_as_the_derivation() {
                     (low as i32 * 256..=high as i32 * 256).contains(&at[axis])
                 };
                 assert!(
-                    !(side(0) && side(1)) || hull.holds(at),
+                    !(side(0) && side(1)) || is_drawn(&hull, at),
                     "round {round}: {corner:?} is not in {hull:?}"
                 );
             }
@@ -410,6 +424,10 @@ fn objects_carry_the_bound_of_their_meshes() {
         for frame in [0, 2] {
             let state = FrameState::at(world, Moment { frame, view: 0 });
             for (id, object) in (0..).zip(&state.objects) {
+                // Nothing of it is drawn.
+                if world.partition.mesh(ObjectId(id)).bounds.is_empty() {
+                    continue;
+                }
                 let number = world.scene.objects[id as usize].mesh as usize;
                 let (mesh, reach) = (&meshes[number], reach[number]);
                 let placed = world.world_from_object(ObjectId(id), frame);

@@ -10,7 +10,7 @@ use super::pyramid::{Ask, Pyramid};
 use super::read_back::{DepthReader, MOST_COPIES};
 use super::redraw::encode_redraw;
 use super::scene_size::{Binned, Filling, Reach, question_bytes};
-use super::slot::{Need, RESULT_BYTES, Slot};
+use super::slot::{Need, RESULT_BYTES, Slot, set_bytes};
 use super::stage::{DrawnObject, GpuParts, GpuStage};
 use crate::oracle::{
     Answer, DeviceLimits, FrameView, Memory, Oracle, OracleError, Proxy, QueryId, Questions,
@@ -490,17 +490,20 @@ impl Hardware {
 
     /// Sends the results of the batch on their way back.
     fn encode_results(&self, encoder: &mut wgpu::CommandEncoder, slot: &Slot) {
-        let bytes = self.open.len() as u64 * RESULT_BYTES;
-        if self.pyramid.is_none() {
-            let per_pass = self.queries_per_pass;
-            for set in 0..self.open.len().div_ceil(per_pass) {
-                let count = (self.open.len() - set * per_pass).min(per_pass);
-                let offset = (set * per_pass) as u64 * RESULT_BYTES;
-                let run = 0..count as u32;
-                encoder.resolve_query_set(&slot.queries[set], run, &slot.resolved, offset);
-            }
+        let (resolved, staging) = (&slot.resolved, &slot.staging);
+        if self.pyramid.is_some() {
+            let bytes = self.open.len() as u64 * RESULT_BYTES;
+            return encoder.copy_buffer_to_buffer(resolved, 0, staging, 0, bytes);
         }
-        encoder.copy_buffer_to_buffer(&slot.resolved, 0, &slot.staging, 0, bytes);
+        let per_pass = self.queries_per_pass;
+        for set in 0..self.open.len().div_ceil(per_pass) {
+            let count = (self.open.len() - set * per_pass).min(per_pass);
+            let from = set as u64 * set_bytes(per_pass);
+            encoder.resolve_query_set(&slot.queries[set], 0..count as u32, resolved, from);
+            // Aligned there, one after another here.
+            let (to, bytes) = ((set * per_pass) as u64 * RESULT_BYTES, count as u64 * RESULT_BYTES);
+            encoder.copy_buffer_to_buffer(resolved, from, staging, to, bytes);
+        }
     }
 
     /// A slot with room for this batch, made or reused.

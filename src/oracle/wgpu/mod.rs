@@ -17,5 +17,4 @@ mod stage;
 
 pub use gpu::{Gpu, NO_DEVICE};
 pub use hardware::Hardware;
-pub use slot::QUERIES_PER_PASS;
 pub use stage::GpuStage;

@@ -38,8 +38,8 @@ const BLOCK_BYTES: u64 = 32 + COMMANDS_IN_BLOCK * 16 + 8 + 8;
 /// `CMD_BLOCK_MAX`: commands in a block; each tile has blocks of its own.
 const COMMANDS_IN_BLOCK: u64 = 29;
 /// `struct lp_rast_state`: 16 constants and 32 buffers of 16 bytes, 128 textures of 224, 32 samplers of 32,
-/// 64 images of 40, 64 more, and the shader.
-const STATE_BYTES: u64 = (16 + 32) * 16 + 128 * 224 + 32 * 32 + 64 * 40 + 64 + 8;
+/// 64 images of 40, 56 more, and the shader.
+const STATE_BYTES: u64 = (16 + 32) * 16 + 128 * 224 + 32 * 32 + 64 * 40 + 56 + 8;
 /// What a question or a draw of a part stores before its triangles: one state, which is never found equal to
 /// the one before (`try_update_scene_state` compares a pointer that only the stored one has), the rest of the
 /// data block of 64 KiB that it did not fit into, and an object's 80 bytes of push constants.

@@ -1,11 +1,13 @@
 //! What a batch of questions needs on the device: query objects and the buffers of its proxies and
 //! results. It must not know what is asked.
 
-/// Queries in one pass; a batch with more has several passes. Mesa 22.3.6's lavapipe returned wrong
-/// counts for some empty queries in passes of 768 and more; 640 were right.
-pub const QUERIES_PER_PASS: usize = 128;
 /// Bytes of one result.
 pub(super) const RESULT_BYTES: u64 = 8;
+
+/// Bytes from the results of one query set to those of the next, where a device may write them.
+pub(super) fn set_bytes(per_pass: usize) -> u64 {
+    (per_pass as u64 * RESULT_BYTES).next_multiple_of(wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT)
+}
 
 /// How much of it.
 pub(super) struct Need {
@@ -55,7 +57,7 @@ impl Slot {
     /// `slot`, or a new one, with room for what a batch needs.
     pub(super) fn with_room(device: &wgpu::Device, slot: Option<Self>, need: Need) -> Self {
         let sets = need.questions.div_ceil(need.per_pass);
-        let bytes = (sets * need.per_pass) as u64 * RESULT_BYTES;
+        let bytes = sets as u64 * set_bytes(need.per_pass);
         let mut slot = slot.unwrap_or_else(|| Self::new(device, bytes, need.proxies));
         if slot.resolved.size() < bytes || slot.proxies.size() < need.proxies {
             let (bytes, proxies) =
