@@ -165,10 +165,13 @@ fn refuse_twice(files: &[PathBuf], sweeps: &BTreeMap<Sweep, Vec<Line>>) -> Resul
     )))
 }
 
+/// A shard with its lines, by seed.
+type Held<'a> = (&'a Sweep, &'a [Line]);
+
 /// What no line tells of, by sweep.
 fn missing(sweeps: &BTreeMap<Sweep, Vec<Line>>) -> Vec<String> {
     // Shards of one sweep, whether cut in as many or not, have the same seeds to share.
-    let mut whole: BTreeMap<(&str, u64, u64), Vec<(&Sweep, &[Line])>> = BTreeMap::new();
+    let mut whole: BTreeMap<(&str, u64, u64), Vec<Held<'_>>> = BTreeMap::new();
     for (sweep, lines) in sweeps {
         let key = (sweep.flags.as_str(), sweep.first, sweep.last);
         whole.entry(key).or_default().push((sweep, lines));

@@ -256,7 +256,9 @@ fn main() -> ExitCode {
     let mut repeated = 0;
     for &triangles in &slid {
         let alone = bench.counts(triangles, QUESTIONS);
-        (0..BUSY).for_each(|_| drop(bench.send(0, WALLS, 0)));
+        for _ in 0..BUSY {
+            bench.send(0, WALLS, 0);
+        }
         repeated += usize::from(bench.counts(triangles, QUESTIONS) == alone);
     }
     println!("{repeated} of {} wrong trials repeat on a busy device", slid.len());

@@ -118,7 +118,9 @@ fn what_asks_without_query_objects_is_sent_at_once() {
     let mut oracle = Hardware::with_limits(&device, Questions::Pyramid, limits).unwrap();
     begin(&mut oracle);
     oracle.draw_part(PartId(0));
-    (0..4).for_each(|_| drop(oracle.ask(&[whole(viewport, false)])));
+    for _ in 0..4 {
+        oracle.ask(&[whole(viewport, false)]);
+    }
     oracle.submit().unwrap();
     assert_eq!(oracle.submissions(), 1);
 }
@@ -144,8 +146,12 @@ fn asked(oracle: &mut dyn Oracle, world: &plainsight::run::World) -> (Vec<Answer
         let rectangle = Proxy::Rectangle { min: [x.0, y.0], max: [x.1, y.1], depth };
         match stream.below(4) {
             0 => oracle.draw_part(PartId(stream.below(parts))),
-            1 => drop(oracle.ask(&[rectangle, rectangle, rectangle])),
-            _ => drop(oracle.ask(&[rectangle])),
+            1 => {
+                oracle.ask(&[rectangle, rectangle, rectangle]);
+            }
+            _ => {
+                oracle.ask(&[rectangle]);
+            }
         }
         if event % 90 == 89 {
             oracle.submit().unwrap();

@@ -99,8 +99,9 @@ impl Reach {
         let half = [viewport.width, viewport.height].map(|side| f64::from(side) * 0.5);
         for [x, y, z, w] in corners {
             let inside = [x + w, w - x, y + w, w - y, z, w - z];
-            // Not "less than zero": what is no number lies beyond.
-            beyond.iter_mut().zip(inside).for_each(|(out, by)| *out = *out || !(by >= 0.0));
+            // What is no number lies beyond.
+            let out = inside.map(|by| by < 0.0 || by.is_nan());
+            beyond.iter_mut().zip(out).for_each(|(beyond, out)| *beyond = *beyond || out);
             nearest = if w > 0.0 { nearest.min(w) } else { 0.0 };
             let window = [half[0] + half[0] * x / w, half[1] - half[1] * y / w];
             for axis in 0..2 {
